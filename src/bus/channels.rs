@@ -1,7 +1,7 @@
-//! A wrapper around a bus for nodes whose SDO channel has other COB-IDs than 600h and 580h + node-ID.
+//! A wrapper around a bus for nodes whose SDO channel does not use the COB-IDs 600h and 580h + node-ID.
 //!
-//! It exchanges the COB-IDs in both directions, so that all other code sees the usual ones. A trace below it shows the
-//! frames as they are on the bus.
+//! The wrapper exchanges the COB-IDs in both directions, so that all other code uses the usual ones. A trace inside the
+//! wrapper shows the COB-IDs on the bus.
 
 use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, delegate_bus};
 use crate::canopen::frame::Frame;
@@ -18,10 +18,10 @@ pub struct SdoChannel {
     pub response: CanId,
 }
 
-/// A bus with nodes that have other SDO channels.
+/// A bus with nodes whose SDO channels have other COB-IDs.
 pub struct SdoChannels<B> {
     bus: B,
-    /// COB-IDs that are exchanged: the usual one and the one on the bus.
+    /// Pairs of exchanged COB-IDs: the usual one, and the one on the bus.
     pairs: Vec<(CanId, CanId)>,
 }
 

@@ -1,11 +1,11 @@
 //! Claims: only one cangauge process at a time uses a node.
 //!
-//! Two programs that send SDO requests to one node at the same time disturb each other. So each command claims the
-//! nodes it works with. The next command waits for them, or fails and names the holder.
+//! Two programs that send SDO requests to one node at the same time disturb each other. So each command claims its
+//! nodes. The next command waits for the nodes, or fails with an error that shows the holder.
 //!
-//! A claim is a name in the abstract namespace of Unix sockets, `@cangauge/can0/5`. It belongs to the same network
-//! namespace as the interface, needs no directory, and is free again as soon as the process ends. Other programs are not
-//! affected. On other systems than Linux nothing is claimed.
+//! A claim is a name in the abstract namespace of Unix sockets, `@cangauge/can0/5`. The name belongs to the network
+//! namespace of the interface and needs no directory. It is released when the process ends. Other programs are not
+//! affected. Claims exist only on Linux.
 
 #[cfg(target_os = "linux")]
 mod holder;
@@ -24,7 +24,7 @@ pub use linux::Claims;
 /// The part of the bus that no other process may use while a command runs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Claim {
-    /// Nothing: the command only listens, or its bus belongs to this process.
+    /// No claim: the command only listens, or its bus belongs to this process.
     #[default]
     Nothing,
     /// The SDO servers and NMT states of these nodes. More than 16 nodes are claimed as all nodes.
@@ -64,9 +64,9 @@ impl fmt::Display for Part {
 /// The reaction if another process holds a part of the claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IfHeld {
-    /// Wait for it, up to this time for the whole claim.
+    /// Wait for the holder, up to this time for the whole claim.
     Wait(Duration),
-    /// Report it and continue.
+    /// Report the holder and continue.
     Continue,
 }
 
@@ -97,13 +97,13 @@ impl fmt::Display for Holder {
 /// Why a claim failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ClaimError {
-    /// Another process holds a part of it, and did not release it in time.
+    /// Another process holds a part of the claim, and did not release it in time.
     #[error("{0} is in use by {1}")]
     InUse(Part, Holder),
     /// The user asked to stop (Ctrl-C, SIGTERM).
     #[error("interrupted")]
     Interrupted,
-    /// The operating system cannot make the socket, for example because too many files are open.
+    /// The operating system cannot create the socket, for example because too many files are open.
     #[error("claim {0}: {1}")]
     System(Part, std::io::Error),
 }

@@ -1,4 +1,4 @@
-//! A macro that forwards methods to an inner bus, so that a wrapper writes only the methods it changes.
+//! A macro that forwards methods to an inner bus, so that a wrapper implements only the methods it changes.
 
 /// Implements methods of [`Bus`](crate::bus::Bus) and [`BitRateControl`](crate::bus::BitRateControl) by calling the
 /// same method of an inner bus.
@@ -131,7 +131,7 @@ mod tests {
     use std::rc::Rc;
     use std::time::Duration;
 
-    /// A bus whose results all differ from the defaults of the traits. It records the calls that change something.
+    /// A bus whose results all differ from the defaults of the traits. It records the calls that change the bus.
     struct Unusual(Rc<RefCell<Vec<String>>>);
 
     impl Unusual {

@@ -16,7 +16,7 @@ pub struct FaultPlan {
     pub lose: BTreeSet<u64>,
     /// Received frames that arrive twice.
     pub duplicate: BTreeSet<u64>,
-    /// Received frames that arrive late, after frames that came in the meantime.
+    /// Received frames that arrive late, after later frames.
     pub delay: BTreeMap<u64, Duration>,
     /// Received frames with one changed byte: its index (modulo the length) and the bits to invert.
     pub garble: BTreeMap<u64, (usize, u8)>,
@@ -28,7 +28,7 @@ pub struct FaultPlan {
     pub full: Option<(Mono, Duration)>,
     /// When the controller goes bus-off. Frames sent after that wait until the queue is full.
     pub bus_off: Option<Mono>,
-    /// After which time it restarts and sends the waiting frames; `None`: never.
+    /// The time after which the controller restarts and sends the waiting frames; `None`: never.
     pub restart_after: Option<Duration>,
 }
 
@@ -138,7 +138,7 @@ impl<B: Bus> Faulty<B> {
         if frame.is_remote() { frame } else { Frame::new(frame.id(), &data).unwrap_or(frame) }
     }
 
-    /// Applies the plan to a received frame and queues the result for delivery.
+    /// Applies the plan to a received frame, and queues the result.
     fn take_in(&mut self, mut received: Received) {
         let number = self.received;
         self.received += 1;

@@ -1,5 +1,5 @@
-//! Facts about open files that only the operating system knows: who writes them, whether they still have their name,
-//! whether a FIFO has a reader.
+//! Queries about open files: which process has the lock, whether the file was renamed or deleted, whether a FIFO has a
+//! reader.
 
 use super::interrupt::Interrupts;
 use std::fs::{File, Metadata, TryLockError};
@@ -10,16 +10,16 @@ use std::time::{Duration, Instant};
 /// Another open file of the same inode has the lock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Locked {
-    /// The process that has it, if known.
+    /// The process that has the lock, if known.
     pub process: Option<u32>,
-    /// Whether this process has it.
+    /// Whether this process has the lock.
     pub is_own: bool,
 }
 
-/// Locks a regular file until it is closed: one file, one writer. Other files are not locked.
+/// Locks a regular file until it is closed, so that it has only one writer. Other files are not locked.
 ///
 /// # Errors
-/// Another process, or this one under another name, is writing the file.
+/// Another process is writing the file, or this process has opened it under another name.
 pub fn lock(file: &File) -> Result<(), Locked> {
     if !file.metadata().is_ok_and(|metadata| metadata.is_file()) {
         return Ok(());
@@ -34,7 +34,7 @@ pub fn lock(file: &File) -> Result<(), Locked> {
     }
 }
 
-/// The process that has the lock, from `/proc/locks`; `None` if that does not show exactly one.
+/// The process that has the lock, from `/proc/locks`; `None` if the file does not show exactly one process.
 fn holder(file: &File) -> Option<u32> {
     let (_, inode) = identity(&file.metadata().ok()?)?;
     let locks = std::fs::read_to_string("/proc/locks").ok()?;
@@ -42,7 +42,8 @@ fn holder(file: &File) -> Option<u32> {
     holders.next().filter(|_| holders.next().is_none())
 }
 
-/// The process in a line of `/proc/locks`: `1: FLOCK  ADVISORY  WRITE 4711 fd:01:1234 0 EOF`. A line with `->` waits.
+/// The process in a line of `/proc/locks`: `1: FLOCK ADVISORY WRITE 4711 fd:01:1234 0 EOF`. A line with `->` is a
+/// process that waits for the lock.
 fn holder_in(line: &str, inode: u64) -> Option<u32> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [_, "FLOCK", _, _, process, place, ..] = words.as_slice() else { return None };
@@ -56,7 +57,7 @@ fn holder_in(line: &str, inode: u64) -> Option<u32> {
 pub enum NameChange {
     /// The file has another name now.
     Moved,
-    /// The file has no name any more.
+    /// The file was deleted.
     Deleted,
 }
 
@@ -70,7 +71,7 @@ pub fn name_change(metadata: &Metadata, path: &Path) -> Option<NameChange> {
     }
 }
 
-/// Whether two files are the same one.
+/// Whether two open files are the same file.
 pub fn is_same(one: &Metadata, other: &Metadata) -> bool {
     identity(one).is_some_and(|one| identity(other) == Some(one))
 }
@@ -97,11 +98,11 @@ fn links(_: &Metadata) -> u64 {
     1
 }
 
-/// How often a FIFO is asked for a reader.
+/// The interval at which a FIFO is checked for a reader.
 const READER_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Waits until a program reads from a FIFO, because opening it would block. Returns the waiting time, and a file that
-/// keeps the FIFO open until the caller has opened it. Another file is not waited for.
+/// keeps the FIFO open until the caller has opened it. Returns at once for other kinds of files.
 ///
 /// # Errors
 /// [`io::ErrorKind::TimedOut`] after `limit`, [`io::ErrorKind::Interrupted`] after a signal.
@@ -165,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_name_is_found() {
+    fn renamed_or_deleted_file_is_detected() {
         let folder = tempfile::tempdir().expect("a folder");
         let [path, other] = ["run.csv", "old.csv"].map(|name| folder.path().join(name));
         let file = File::create(&path).expect("created");

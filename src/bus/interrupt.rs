@@ -8,16 +8,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// The longest sleep. An [`Instant`] cannot hold every sum.
+/// The longest sleep. A longer sleep could overflow an [`Instant`].
 const A_CENTURY: Duration = Duration::from_secs(100 * 365 * 24 * 3600);
 
 /// Receives the signals SIGINT and SIGTERM.
 ///
-/// Each instance gets each signal that arrives during its life, so two buses in one process both get it. From the first
-/// instance on, Ctrl-C no longer ends the program by itself: the owner of an instance must check it.
+/// Each instance receives each signal that arrives during its lifetime, so two buses in one process both receive it.
+/// From the first instance on, Ctrl-C no longer ends the program by itself: the owner of an instance must check for it.
 #[derive(Debug)]
 pub struct Interrupts {
-    /// Set after the byte in the pipe. A busy reader sees with one load that there is nothing to read.
+    /// Set after the byte is written to the pipe, so that a busy reader needs only one load.
     raised: Arc<AtomicBool>,
     pending: usize,
     registered: Vec<SigId>,
@@ -59,7 +59,7 @@ impl Interrupts {
     }
 }
 
-/// From now on, a write beyond the limit for the size of a file (SIGXFSZ) fails like one to a full disk.
+/// Makes a write beyond the file size limit (SIGXFSZ) fail like a write to a full disk, from now on.
 ///
 /// # Errors
 /// The system rejects the handler.
@@ -70,7 +70,7 @@ pub fn survive_file_size_limit() -> io::Result<()> {
 }
 
 /// Whether SIGHUP was ignored when the program started, as `nohup` does. Read once, because the handlers change the
-/// answer.
+/// result.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "the standard library cannot read the action of a signal")]
 fn ignores_hangup() -> bool {
@@ -114,7 +114,7 @@ impl Interrupts {
             match super::poll::readable([self.fd()], left) {
                 Ok([true]) => self.collect(),
                 Ok([false]) => {}
-                // Polling one own descriptor fails only without memory.
+                // Polling one descriptor of this process fails only if no memory is left.
                 Err(_) => std::thread::sleep(left),
             }
         }
@@ -125,7 +125,7 @@ impl Interrupts {
         std::os::fd::AsFd::as_fd(&self.pipe)
     }
 
-    /// Reads the pipe. Call it when [`Interrupts::fd`] is readable, because the byte arrives shortly before the flag.
+    /// Reads the pipe. Call this when [`Interrupts::fd`] is readable, because the byte arrives shortly before the flag.
     pub(super) fn collect(&mut self) {
         self.raised.store(false, Ordering::Release);
         let mut bytes = [0; 64];
@@ -208,7 +208,7 @@ mod tests {
             std::thread::sleep(Duration::from_millis(30));
             low_level::raise(SIGUSR2)
         });
-        // The longest sleep does not overflow either.
+        // The longest sleep must not overflow.
         assert!(interrupts.wait_for(Duration::MAX));
         assert!(start.elapsed() < Duration::from_secs(60));
         assert!(!interrupts.wait_until(Instant::now()));

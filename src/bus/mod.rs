@@ -1,7 +1,7 @@
 //! CAN buses: the trait [`Bus`] and its transports.
 //!
-//! This layer promises frames with two receive times, waits with a deadline, and a clock. It is the only place with
-//! sockets, clocks, signals and `unsafe`. It knows frames and no protocol.
+//! This layer provides frames with two receive times, waits with a deadline, and a clock. Sockets, clocks, signals and
+//! `unsafe` occur only in this layer. It handles frames, but no protocol.
 
 pub mod channels;
 pub mod claim;
@@ -29,22 +29,22 @@ pub use delegate::delegate_bus;
 use std::fmt;
 pub use time::{Mono, Stamp, Wall};
 
-/// Transport and time of a CAN bus: frames out, events in.
+/// Transport and time of a CAN bus: it sends frames and receives events.
 ///
-/// Only [`Bus::receive`] waits, and never beyond the deadline it is given.
+/// Only [`Bus::receive`] waits, and never after its deadline.
 pub trait Bus: BitRateControl {
-    /// The name shown to people and written to traces: `can0`, `sim`.
+    /// The name in messages and traces: `can0`, `sim`.
     fn name(&self) -> &str;
 
-    /// Where the wall time of received frames comes from.
+    /// The source of the wall time of received frames.
     fn timestamps(&self) -> TimestampSource;
 
-    /// Whether other participants may be on the bus now. `false` for a recording, which only receives and ends.
+    /// Whether other participants may be on the bus. `false` for a recording.
     fn is_live(&self) -> bool {
         true
     }
 
-    /// Whether the bus waits for a slow program. On a recording and on a virtual clock, time passes only inside
+    /// Whether the bus waits for a slow program. For recordings and virtual clocks, time passes only inside
     /// [`Bus::receive`].
     fn waits(&self) -> bool {
         !self.is_live()
@@ -53,7 +53,7 @@ pub trait Bus: BitRateControl {
     /// The present moment on both time lines.
     fn now(&self) -> Stamp;
 
-    /// The present moment on the monotonic time line only. On some machines each clock is a system call.
+    /// The present moment on the monotonic time line only. Reading both clocks is slow on some machines.
     fn mono(&self) -> Mono {
         self.now().mono
     }
@@ -65,27 +65,27 @@ pub trait Bus: BitRateControl {
     /// The operating system rejects the filters.
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError>;
 
-    /// Hands one frame to the bus.
+    /// Passes one frame to the bus.
     ///
     /// # Errors
     /// [`BusError::QueueFull`]: the frame was not sent; try again after a short time.
     fn send(&mut self, frame: &Frame) -> Result<(), BusError>;
 
-    /// Waits for the next event. Returns [`Event::Timeout`] when `deadline` is reached. With a deadline in the past
-    /// it returns an event that is already there, without waiting.
+    /// Waits for the next event. Returns [`Event::Timeout`] when `deadline` is reached. With a deadline in the past,
+    /// returns an event that was already received, without waiting.
     ///
     /// # Errors
     /// The bus failed. The caller may call again.
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError>;
 
-    /// The size of the buffer for frames that were received and not read yet. `None` if it has no limit or the
-    /// limit is unknown.
+    /// The size of the buffer for received frames that are not read yet. `None` if it has no limit or the limit is
+    /// unknown.
     fn receive_buffer(&self) -> Option<ReceiveBuffer> {
         None
     }
 
-    /// The number of frames that the kernel dropped and that no [`Event::Dropped`] reported. That event comes with
-    /// the next frame, so drops after the last frame show only here. Each frame is counted once.
+    /// The number of frames that the kernel dropped and that no [`Event::Dropped`] reported. That event comes with the
+    /// next frame, so drops after the last frame are reported only here. Each frame is counted once.
     fn late_drops(&mut self) -> u32 {
         0
     }
@@ -100,7 +100,7 @@ pub trait Bus: BitRateControl {
     }
 }
 
-/// The bit rate of the interface behind a [`Bus`]: read it, set it, restore it.
+/// Reads, sets and restores the bit rate of the interface of a [`Bus`].
 ///
 /// A transport without such control implements the trait with an empty block.
 pub trait BitRateControl {
@@ -109,8 +109,7 @@ pub trait BitRateControl {
         None
     }
 
-    /// Checks whether [`BitRateControl::set_bit_rate`] can work, before the caller changes anything that depends on
-    /// it.
+    /// Checks whether [`BitRateControl::set_bit_rate`] is possible, before the caller makes changes that depend on it.
     ///
     /// # Errors
     /// [`BusError::Permission`]: no privilege. [`BusError::Unsupported`]: this bus has no such function.
@@ -118,8 +117,8 @@ pub trait BitRateControl {
         Err(BusError::Unsupported("the bit rate of this bus cannot be set from here".to_owned()))
     }
 
-    /// Sets the interface to another bit rate in bit/s: it goes down and comes up again. Frames that wait to be
-    /// sent and received frames that were not read yet are lost.
+    /// Sets the interface to another bit rate in bit/s: it goes down and comes up again. Waiting frames and unread
+    /// frames are lost.
     ///
     /// # Errors
     /// The interface rejects the bit rate. It is then restored as far as possible.
@@ -127,8 +126,8 @@ pub trait BitRateControl {
         self.can_set_bit_rate()
     }
 
-    /// Restores bit rate, mode and up/down state from before the first [`BitRateControl::set_bit_rate`]. Does
-    /// nothing if the bit rate was not set.
+    /// Restores the bit rate, mode and up/down state before the first [`BitRateControl::set_bit_rate`]. Does nothing if
+    /// the bit rate was not set.
     ///
     /// # Errors
     /// The interface cannot be restored; the error describes its state.
@@ -168,7 +167,7 @@ pub enum Mode {
     /// It sends and acknowledges.
     #[default]
     Normal,
-    /// It only receives: it sends no frames, no acknowledge and no error flags.
+    /// It only receives: it sends no frames, no acknowledgements and no error flags.
     ListenOnly,
 }
 
@@ -185,7 +184,7 @@ pub enum Event {
     Link(bool),
     /// The deadline was reached.
     Timeout,
-    /// The recording has ended. Reported once; after that only time passes.
+    /// The recording has ended. Reported once; after that there are only time-outs.
     Ended,
     /// The user asked to stop (Ctrl-C, SIGTERM). Reported once per signal, so that the caller can still use the bus to
     /// clean up.
@@ -224,7 +223,7 @@ pub enum Fault {
     Transceiver,
     /// A transmission took too long.
     TransmitTimeout,
-    /// Anything else.
+    /// Another fault.
     Other,
 }
 
@@ -236,7 +235,7 @@ impl fmt::Display for Fault {
             Fault::ErrorWarning => "error warning",
             Fault::ErrorActive => "error active again",
             Fault::Restarted => "restarted after bus-off",
-            Fault::NoAcknowledge => "no acknowledge: no other node at this bit rate",
+            Fault::NoAcknowledge => "no acknowledgement: no other node at this bit rate",
             Fault::Protocol => "protocol error on the bus",
             Fault::ControllerOverflow => "controller buffer overflow",
             Fault::Transceiver => "transceiver fault",
@@ -246,18 +245,18 @@ impl fmt::Display for Fault {
     }
 }
 
-/// Where the wall time of a received frame comes from.
+/// The source of the wall time of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimestampSource {
     /// The clock of the interface, converted to the host's time.
     Hardware,
-    /// The kernel, when the driver delivered the frame.
+    /// The clock of the kernel, when the driver delivered the frame.
     Kernel,
-    /// This program, when it read the frame.
+    /// The clock of this program, when it read the frame.
     Program,
     /// The clock of the simulated bus.
     Simulated,
-    /// The program that recorded the frame.
+    /// The time stamp in the recording.
     Recorded,
 }
 
@@ -301,7 +300,7 @@ pub enum BusError {
     /// No interface of that name.
     #[error("there is no CAN interface \"{0}\"")]
     NoInterface(String),
-    /// The interface exists and is down.
+    /// The interface exists but is down.
     #[error("interface {0} is down")]
     Down(String),
     /// The interface is not a CAN interface.

@@ -1,9 +1,9 @@
-//! Who owns a file: as root, only files of root are trusted.
+//! The owner of a file: a root process trusts only files of root.
 
 use std::fs::File;
 use std::io;
 
-/// Whether a file may be read without being named: it belongs to root, or this process does not run as root.
+/// Whether a file that the user did not name may be read: it belongs to root, or this process does not run as root.
 ///
 /// # Errors
 /// The owner of the file is unknown.
@@ -15,7 +15,7 @@ pub fn is_trusted(file: &File) -> io::Result<bool> {
     Ok(!is_root || file.metadata()?.uid() == 0)
 }
 
-/// Other systems have no root.
+/// On other systems, every file is trusted.
 ///
 /// # Errors
 /// None.

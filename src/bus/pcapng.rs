@@ -12,7 +12,7 @@ const SECTION_HEADER: u32 = 0x0a0d_0d0a;
 const INTERFACE_DESCRIPTION: u32 = 1;
 const ENHANCED_PACKET: u32 = 6;
 
-/// Options of an interface: its name, and the resolution of times as the exponent of 1/10.
+/// Options of an interface: its name, and the resolution of times as a negative power of ten.
 const IF_NAME: u16 = 2;
 const IF_TSRESOL: u16 = 9;
 
@@ -65,7 +65,7 @@ fn option(code: u16, value: &[u8]) -> Vec<u8> {
     [&code.to_le_bytes()[..], &length.to_le_bytes(), &padded(value)].concat()
 }
 
-/// Fills up to a multiple of four bytes.
+/// Pads to a multiple of four bytes.
 fn padded(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     bytes.resize(bytes.len().next_multiple_of(4), 0);

@@ -1,4 +1,4 @@
-//! Waits until a file descriptor is readable, with nanosecond resolution if the system has it.
+//! Waits until a file descriptor is readable, with nanosecond resolution if the system supports it.
 
 use std::io;
 use std::os::fd::{AsRawFd, BorrowedFd};
@@ -17,7 +17,7 @@ pub(super) fn readable<const N: usize>(fds: [BorrowedFd<'_>; N], limit: Duration
     }
 }
 
-/// The same for any number of descriptors.
+/// Polls any number of descriptors, with nanosecond resolution.
 #[cfg(target_os = "linux")]
 pub(super) fn any_readable(fds: &[BorrowedFd<'_>], limit: Duration) -> io::Result<Vec<bool>> {
     let poll = |fd: &BorrowedFd<'_>| libc::pollfd { fd: fd.as_raw_fd(), events: libc::POLLIN, revents: 0 };

@@ -1,7 +1,7 @@
 //! Replays a recording as a bus: a log of candump, Vector ASC, PEAK TRC, or CSV of python-can, also compressed by gzip.
 //!
-//! The time is that of the recording. It passes as fast as the program reads, or in real time. Each format has a
-//! `Parser` that turns a line into a frame with its time. Order, broken lines and channels are handled here.
+//! Times are those of the recording. The recording is read at full speed or in real time. Each format has a `Parser`,
+//! which converts a line to a frame with its time. Order, broken lines and channels are handled here.
 
 mod asc;
 mod candump;
@@ -27,22 +27,22 @@ use std::mem;
 use std::time::{Duration, Instant};
 use text::FrameOrFault;
 
-/// After this many lines that show no format, the file is not a recording.
+/// A file is not a recording after this many lines of unknown format.
 const MAX_UNKNOWN: u64 = 100;
 
-/// Lines that are read ahead to see whether times without a date increase.
+/// The number of lines read ahead to check whether times without a date increase.
 const LINES_AHEAD: usize = 1000;
 
-/// Channels of a recording that are named.
+/// The number of channels listed in messages.
 const MAX_CHANNELS: usize = 16;
 
 /// Times before this moment (March 1973) have no date: they count from the start of the recording.
 const FIRST_DATE: Duration = Duration::from_secs(100_000_000);
 
-/// A longer time between two lines is a step of the clock, from 1970 to the present for example.
+/// A longer time between two lines is a step of the clock, for example from 1970 to the present.
 const LONGEST_PAUSE: Duration = Duration::from_secs(24 * 3600);
 
-/// A line may be earlier than the one before by this time: interrupts of two controllers are not in order.
+/// A line may be earlier than the previous one by this time, because interrupts of two controllers are not in order.
 const DISORDER: Duration = Duration::from_millis(10);
 
 /// Reads the lines of one format.
@@ -60,12 +60,12 @@ enum Line<'a> {
     WithoutTime,
     /// A header, another event, or a CAN FD frame, which CANopen does not use.
     Ignored,
-    /// Something else.
+    /// Not a line of this format.
     Unknown,
 }
 
 impl<'a> Line<'a> {
-    /// A line with a time: `None` if the rest is not understood, `Some(None)` if it is nothing for CANopen.
+    /// A line with a time. `event` is `None` for unknown text, and `Some(None)` if CANopen does not use the event.
     fn at(wall: Wall, channel: &'a str, event: Option<Option<FrameOrFault>>) -> Line<'a> {
         match event {
             Some(Some(event)) => Line::Event(wall, channel, event),
@@ -75,31 +75,31 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Something to know about a recording that is replayed.
+/// A note about a replayed recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReplayNote {
     /// Lines that the format does not allow were skipped.
     Skipped {
         /// The format.
         format: RecordingFormat,
-        /// How many.
+        /// The number of lines.
         count: u64,
-        /// The number of the first one, counted from 1.
+        /// The first of these lines, counted from 1.
         first: u64,
     },
     /// The times count from the start of the recording; its date is unknown.
     NoDate,
     /// The file ends in the middle of its last line, which has this number and was skipped.
     CutOff(u64),
-    /// The clock was set during the recording. These steps count as no time.
+    /// The clock was set during the recording. These steps are ignored.
     ClockSet {
-        /// How many steps.
+        /// The number of steps.
         count: u64,
-        /// The line of the first one, counted from 1.
+        /// The line of the first step, counted from 1.
         line: u64,
-        /// Its size.
+        /// The size of the first step.
         by: Duration,
-        /// Whether it is a step backwards.
+        /// Whether the first step is backwards.
         is_backwards: bool,
     },
 }
@@ -117,7 +117,7 @@ pub struct Replay {
     format: Option<KnownFormat>,
     /// The channel to replay; the only one if none is chosen.
     channel: Option<String>,
-    /// The channels that frames came from.
+    /// The channels of the frames so far.
     channels: Vec<String>,
     /// The time of the last line that was read.
     last: Option<Stamp>,
@@ -130,7 +130,7 @@ pub struct Replay {
     next: Option<(Stamp, Event)>,
     state: State,
     filters: Filters,
-    /// When the replay in real time started, and how to wait.
+    /// The start of a replay in real time, and the wait function.
     pace: Option<(Instant, Box<dyn Sleeper>)>,
     /// Whether any line was a frame.
     is_recording: bool,
@@ -143,7 +143,7 @@ pub struct Replay {
     report: Report,
 }
 
-/// Takes notes about the recording, at the latest when the bus is dropped.
+/// Receives notes about the recording, at the latest when the bus is dropped.
 type Report = Box<dyn FnMut(&ReplayNote)>;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -156,7 +156,7 @@ enum State {
 }
 
 impl Replay {
-    /// Opens the recording `file`; `-` is standard input. `report` takes notes about it.
+    /// Opens the recording `file`; `-` is standard input. `report` receives notes about it.
     ///
     /// # Errors
     /// The file cannot be opened.
@@ -218,7 +218,7 @@ impl Replay {
         let (now, before) = (wall.since_epoch(), last.wall.since_epoch());
         let (forwards, backwards) = (now.saturating_sub(before), before.saturating_sub(now));
         if let Some((earlier, _)) = self.before_step.take_if(|(_, size)| forwards >= *size) {
-            // Only single lines were early.
+            // The clock was not set: only single lines were early.
             let mono = earlier.mono + now.saturating_sub(earlier.wall.since_epoch());
             self.last = Some(Stamp { mono, wall });
             return Stamp { mono: mono.max(self.now), wall };
@@ -229,7 +229,7 @@ impl Replay {
             self.before_step = (!backwards.is_zero()).then_some((last, backwards));
         }
         let mono = if is_step { last.mono } else { last.mono + forwards };
-        // A frame that is slightly too early moves nothing.
+        // A frame that is slightly too early does not change the time line.
         if is_step || backwards.is_zero() {
             self.last = Some(Stamp { mono, wall });
         }
@@ -270,7 +270,7 @@ impl Replay {
         let text = text_of(bytes);
         let text = text.trim();
         let Some((format, parser)) = self.format_by(text)? else { return self.skip(number, bytes, text) };
-        // The last number of a decimal ASC may be cut off.
+        // The last number of a decimal ASC line may be cut off.
         let is_complete = *format != RecordingFormat::Asc || bytes.ends_with(b"\n");
         match parser.line(text) {
             Line::Event(wall, channel, event) if wall <= Wall::LAST && is_complete => {
@@ -278,12 +278,12 @@ impl Replay {
             }
             Line::Ignored => Ok(()),
             Line::WithoutTime if !self.is_recording => Err(self.wrong(Some(number), RecordingError::NoTimes)),
-            // RFC 3339 has no years beyond 9999.
+            // RFC 3339 does not allow years after 9999.
             Line::Event(..) | Line::WithoutTime | Line::Unknown => self.skip(number, bytes, text),
         }
     }
 
-    /// The format and its parser. `text` is a line that may show it.
+    /// The format and its parser. `text` is a line that may show the format.
     fn format_by(&mut self, text: &str) -> Result<Option<&mut KnownFormat>, BusError> {
         if self.format.is_none() {
             if let Some(format) = FileFormat::of(&self.lines.start) {
@@ -313,7 +313,7 @@ impl Replay {
         if !self.is_recording && *count >= MAX_UNKNOWN { Err(self.not_a_recording()) } else { Ok(()) }
     }
 
-    /// Takes an event of the recording.
+    /// Handles an event of the recording.
     fn take(&mut self, number: u64, wall: Wall, channel: &str, event: FrameOrFault) -> Result<(), BusError> {
         if !self.is_recording {
             self.is_recording = true;
@@ -342,9 +342,9 @@ impl Replay {
         Ok(())
     }
 
-    /// Reads further lines of a candump log whose times have no date. If one of ten times or more is not later than the
-    /// time before, the times are taken as intervals, and the recording is rejected. The intervals are not added up,
-    /// because times of a low resolution look the same.
+    /// Reads further lines of a candump log whose times have no date. If at least one of ten times is not later than
+    /// the previous one, the times are probably intervals, and the recording is rejected. The intervals are not added
+    /// up, because times of low resolution look the same.
     fn look_ahead(&mut self, first: u64, wall: Wall) -> Result<(), BusError> {
         let Some((RecordingFormat::Candump, parser)) = &mut self.format else { return Ok(()) };
         let (mut last, mut steps, mut not_later) = (wall, 0, 0);

@@ -1,7 +1,7 @@
-//! stdout, or the error that it was closed when the program started.
+//! Opens stdout, or reports that it was closed when the program started.
 //!
-//! The standard library opens `/dev/null` in place of a closed stdout before `main`, and ignores the error of writing to
-//! a closed one. So this module looks before both.
+//! Before `main`, the standard library replaces a closed stdout with `/dev/null`. It also ignores errors of writing to a
+//! closed stdout. So this module checks stdout before the standard library starts.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,7 +25,7 @@ static LOOK: extern "C" fn() = {
 /// stdout.
 ///
 /// # Errors
-/// It was closed when the program started. The kind of the error differs from that of a closed pipe.
+/// stdout was closed when the program started. The kind of the error differs from that of a closed pipe.
 pub fn stdout() -> io::Result<io::Stdout> {
     if IS_CLOSED.load(Ordering::Relaxed) { Err(io::Error::other("it is closed")) } else { Ok(io::stdout()) }
 }

@@ -18,18 +18,18 @@ impl Mono {
         Mono(since_start)
     }
 
-    /// How long after the opening of the bus this is.
+    /// The time since the bus was opened.
     pub fn since_start(self) -> Duration {
         self.0
     }
 
-    /// How much later `self` is than `earlier`, zero if it is not later.
+    /// The time from `earlier` to `self`; zero if `self` is not later.
     pub fn since(self, earlier: Mono) -> Duration {
         self.0.saturating_sub(earlier.0)
     }
 }
 
-/// Saturates at the last moment that the type can hold.
+/// Saturates at the last moment of the type.
 impl Add<Duration> for Mono {
     type Output = Mono;
 
@@ -60,7 +60,7 @@ impl Wall {
         Wall(since_epoch)
     }
 
-    /// The present time of the host's clock. A clock set before 1970 reads as 1970.
+    /// The present time of the clock of the host; 1970 if the clock is earlier.
     pub fn now() -> Wall {
         Wall(SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default())
     }
@@ -76,7 +76,7 @@ impl Wall {
     }
 }
 
-/// Saturates at the last moment that the type can hold.
+/// Saturates at the last moment of the type.
 impl Add<Duration> for Wall {
     type Output = Wall;
 
@@ -88,9 +88,9 @@ impl Add<Duration> for Wall {
 /// A moment on both time lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stamp {
-    /// For intervals and deadlines.
+    /// The time for intervals and deadlines.
     pub mono: Mono,
-    /// For users and files.
+    /// The time for users and files.
     pub wall: Wall,
 }
 

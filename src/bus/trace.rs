@@ -1,12 +1,11 @@
-//! A wrapper around a bus that writes each sent and received frame, in the format of `candump -L` or for Wireshark.
+//! A wrapper around a bus that writes each sent and received frame, in the format of `candump -L` or pcapng.
 
 use super::{BitRateControl, Bus, BusError, Event, Mono, Received, Stamp, Wall, delegate_bus, pcapng};
 use crate::canopen::frame::Frame;
 use std::io::{self, BufWriter, Write};
 use std::time::Duration;
 
-/// The longest time that a line stays in the buffer, so that a trace can be read while the program runs or after a
-/// kill.
+/// The longest time that a line stays in the buffer. A trace can thus be read while the program runs, or after a kill.
 const FLUSH_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A bus that writes a trace, one line per frame: `(1436509052.249713) can0 044#2A366C2BBA`. A file `*.pcapng` is written
@@ -93,7 +92,7 @@ impl<B: Bus> Bus for Traced<B> {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        // Read before sending: an answer may arrive before the clock is read afterwards.
+        // The clock is read before sending, because an answer may arrive before a later reading.
         let at = self.bus.now();
         self.bus.send(frame)?;
         self.line(at, frame, true);

@@ -15,7 +15,7 @@ pub struct Emergency {
 }
 
 impl Emergency {
-    /// Parses the data of an emergency frame; `None` if it has fewer than two bytes. The caller knows the node by the
+    /// Parses the data of an emergency frame; `None` if it has fewer than two bytes. The caller finds the node by the
     /// COB-ID (1014h, or the predefined identifier).
     pub fn parse(frame: &Frame) -> Option<Emergency> {
         let [low, high, rest @ ..] = frame.data() else { return None };
@@ -27,7 +27,7 @@ impl Emergency {
         Some(Emergency { code: u16::from_le_bytes([*low, *high]), register, manufacturer })
     }
 
-    /// The meaning of an error code by its class (CiA 301, table 26). It is used if the description has no text for it.
+    /// The meaning of an error code by its class (CiA 301, table 26). Used if the description has no text for the code.
     pub fn class(code: u16) -> &'static str {
         match code {
             0x8110 => "CAN overrun",

@@ -45,8 +45,7 @@ impl NmtCommand {
         Frame::pair(CanId::NMT, self.specifier(), node.map_or(0, NodeId::get))
     }
 
-    /// The state a node is in when it has carried the command out; a reset ends in
-    /// PRE-OPERATIONAL unless the device starts on its own.
+    /// The state of a node after the command. A reset ends in PRE-OPERATIONAL, unless the device starts by itself.
     pub fn target(self) -> NmtState {
         match self {
             NmtCommand::Start => NmtState::Operational,
@@ -125,9 +124,9 @@ impl Life {
     /// Parses a heartbeat, boot-up message or node guarding answer. `None` for any other frame, including remote
     /// frames (guarding requests).
     ///
-    /// Some devices send more than one byte: the first one counts. A frame of 0 bytes on 700h + node-ID proves nothing: it
-    /// is usually a guarding request whose RTR bit was lost. A frame of 0 bytes on 080h + node-ID is the boot-up message of
-    /// devices before CiA 301 version 4.
+    /// Some devices send more than one byte; only the first is used. A frame of 0 bytes on 700h + node-ID is ignored:
+    /// it is usually a guarding request whose RTR bit was lost. A frame of 0 bytes on 080h + node-ID is the boot-up
+    /// message of devices older than CiA 301 version 4.
     pub fn parse(frame: &Frame) -> Option<(NodeId, Life)> {
         if let (Some(node), []) = (frame.id().emergency_node(), frame.data()) {
             return (!frame.is_remote()).then_some((node, Life::BootUp));
@@ -140,7 +139,7 @@ impl Life {
         }
     }
 
-    /// The node and the number of bytes of a frame on 700h + node-ID that has not exactly one byte, as CiA 301 requires.
+    /// The node and the length of a frame on 700h + node-ID, unless the frame has one byte as CiA 301 requires.
     pub fn odd_length(frame: &Frame) -> Option<(NodeId, usize)> {
         let node = frame.id().heartbeat_node().filter(|_| !frame.is_remote())?;
         let length = frame.data().len();

@@ -50,8 +50,8 @@ impl CobId {
         self.0 & CobId::INVALID == 0
     }
 
-    /// Whether a remote request is answered (bit 30 clear). PDOs only: in 1005h the bit says that the
-    /// device sends SYNC.
+    /// Whether a remote request is answered (bit 30 clear). PDOs only: in 1005h the bit means that the device sends
+    /// SYNC.
     pub fn allows_rtr(self) -> bool {
         self.0 & CobId::NO_RTR == 0
     }
@@ -167,9 +167,8 @@ pub struct Field {
 }
 
 impl Field {
-    /// Extracts the field from the data of a PDO: its bytes in wire order, and their number. If the length is not a
-    /// multiple of 8, the upper bits of the last byte are 0. `None` if the data ends before the field does, or if the
-    /// field has more than 64 bits.
+    /// Extracts the field from the data of a PDO: its bytes in wire order, and their number. Unused upper bits of the
+    /// last byte are 0. `None` if the data is too short, or the field has more than 64 bits.
     pub fn bytes(&self, data: &[u8]) -> Option<([u8; 8], usize)> {
         let bits = u32::from(self.entry.bits);
         let end = usize::from(self.start) + usize::from(self.entry.bits);

@@ -293,10 +293,10 @@ impl fmt::Display for Value {
     }
 }
 
-/// Days between the epoch of Unix and the one of CANopen, 1984-01-01.
+/// Days between the Unix epoch and the CANopen epoch, 1984-01-01.
 const DAYS_1970_TO_1984: u16 = 5113;
 
-/// Very large and very small numbers in scientific notation: a REAL32 of 1e-38 is unreadable otherwise.
+/// Writes very large and very small numbers in scientific notation.
 fn write_real<T: fmt::Display + fmt::LowerExp>(f: &mut fmt::Formatter<'_>, number: T, scientific: bool) -> fmt::Result {
     let text = number.to_string();
     if scientific && text != "inf" && text != "-inf" && text != "NaN" {
@@ -312,14 +312,14 @@ fn write_real<T: fmt::Display + fmt::LowerExp>(f: &mut fmt::Formatter<'_>, numbe
 pub struct WidthError {
     /// Bytes of the type.
     pub expected: usize,
-    /// Bytes that were there.
+    /// Bytes found.
     pub found: usize,
 }
 
-/// Text that makes no value of a type.
+/// Text that is not a value of the type.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ValueError {
-    /// Not of the type's form.
+    /// The text does not have the form of the type.
     #[error("\"{text}\" is not a value of type {data_type}")]
     Form {
         /// The typed text.

@@ -77,7 +77,7 @@ impl Wire {
 
     /// Adds the lowest `width` bits of `value`, highest bit first.
     fn put(&mut self, value: u32, width: u32) {
-        // A reversed range would take most of the simulator's time in a build without optimization.
+        // A reversed range would be slow in a build without optimization.
         let mut position = width;
         while position > 0 {
             position -= 1;

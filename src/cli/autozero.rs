@@ -10,7 +10,7 @@ use crate::master::Master;
 use crate::node::Overrides;
 use crate::output::autozero::ZeroReport;
 use crate::output::notes;
-use crate::tasks::autozero::{Action, AutozeroFailure, Limit, Options, Zeroed, autozero};
+use crate::tasks::autozero::{AutozeroFailure, Limit, Options, ZeroTarget, Zeroed, autozero};
 use crate::tasks::failure::Cause;
 use crate::tasks::{Failure, Kind};
 use clap::Args;
@@ -75,7 +75,7 @@ impl Autozero {
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let options = Options {
-            action: Action::Autozero,
+            target: ZeroTarget::Autozero,
             channel: self.channel,
             limit: self.limit.unwrap_or_default(),
             samples: self.samples,

@@ -3,7 +3,7 @@
 use super::exit::{FileError, open_stdout};
 use crate::bus::file::{Locked, is_same, lock, wait_for_reader};
 use crate::output::failure::ErrorMessage;
-use crate::output::rows::{ExistingLines, Target, existing_lines};
+use crate::output::rows::{ExistingLines, OutputTarget, existing_lines};
 use crate::tasks::Kind;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -109,12 +109,12 @@ impl OutFile {
     }
 
     /// The file for a writer that keeps its first `keep` bytes and replaces the rest.
-    pub(super) fn target(&self, keep: u64) -> anyhow::Result<Target> {
+    pub(super) fn target(&self, keep: u64) -> anyhow::Result<OutputTarget> {
         let file = self.file.try_clone().map_err(|source| self.error(source))?;
         Ok(if self.is_own_stream {
-            Target::Stream(Box::new(file))
+            OutputTarget::Stream(Box::new(file))
         } else {
-            Target::File { file, path: self.path.clone(), keep }
+            OutputTarget::File { file, path: self.path.clone(), keep }
         })
     }
 

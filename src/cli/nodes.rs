@@ -10,7 +10,7 @@ use crate::measure::layout::Signal;
 use crate::node::{Node, Overrides};
 use crate::output::failure::ErrorMessage;
 use crate::output::notes;
-use crate::tasks::settings::{open as open_node, select};
+use crate::tasks::settings::{open as open_node, select_signals};
 use crate::tasks::{Failure, Kind, Note};
 
 /// The results of all nodes.
@@ -72,7 +72,7 @@ pub(super) fn on_channels<T>(
     mut work: impl FnMut(&mut Master<'_>, &mut Node, Option<&str>) -> Result<T, Failure>,
 ) -> anyhow::Result<NodeResults<T>> {
     on_node(global, node, |master, node| {
-        let names = signals.map(|text| select(node, text, |signal| applies(node, signal))).transpose()?;
+        let names = signals.map(|text| select_signals(node, text, |signal| applies(node, signal))).transpose()?;
         let names: Vec<Option<String>> = names.map_or(vec![None], |names| names.into_iter().map(Some).collect());
         let mut results = NodeResults { count: names.len(), done: Vec::new(), failures: Vec::new() };
         for name in names {

@@ -113,6 +113,6 @@ fn unknown(model: &Model, query: &str) -> ErrorMessage {
     let message = format!("{} has no object \"{query}\"", model.description.title);
     match nearest(query, model.dictionary.iter().map(Entry::full_name)) {
         names if names.is_empty() => ErrorMessage::usage(message),
-        names => ErrorMessage::usage(message).hint(format!("nearest: {}", names.join(", "))),
+        names => ErrorMessage::usage(message).hint(format!("similar names: {}", names.join(", "))),
     }
 }

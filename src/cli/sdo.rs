@@ -14,7 +14,7 @@ use crate::node::write::is_signature;
 use crate::node::{Form, Node, WriteOptions, Written, names};
 use crate::output::failure::ErrorMessage;
 use crate::output::notes;
-use crate::output::progress::Transfer;
+use crate::output::progress::TransferProgress;
 use crate::output::sdo::{ObjectValue, ValueForm};
 use crate::output::text;
 use crate::tasks::sdo::{FILE_LIMIT, ReadOptions, clipping, encode, find_form, read, write};
@@ -183,7 +183,7 @@ impl ReadArgs {
         let to_stdout = self.output.as_deref() == Some(Path::new("-"));
         let path = self.output.as_deref().filter(|_| !to_stdout);
         let mut file = path.map(|path| OutFile::create(path, self.force)).transpose()?;
-        let bar = Transfer::new(global.shows_progress());
+        let bar = TransferProgress::new(global.shows_progress());
         let mut values = Vec::new();
         let longest = if self.output.is_some() { FILE_LIMIT } else { TEXT_LIMIT };
         let result = global.with_master(|master| {
@@ -191,7 +191,7 @@ impl ReadArgs {
             for object in &self.objects {
                 let at = resolve(&mut node, master, object)?;
                 descriptions::warn_about(global, node.model.as_ref(), at.index);
-                let mut progress = |moved| bar.moved(moved);
+                let mut progress = |moved| bar.show_bytes(moved);
                 let (blocks, is_exact) = (self.block.into(), self.output.is_some());
                 let mut options = ReadOptions { blocks, longest, is_exact, progress: &mut progress };
                 let read = read(master, &mut node, at, self.data_type, &mut options)?;
@@ -297,8 +297,8 @@ impl WriteArgs {
             let form = self.sdo_size.into();
             // The first SDO to a node is a read: a transfer that another master did not finish then disturbs no write.
             find_form(master, &mut node)?;
-            let bar = Transfer::new(global.shows_progress());
-            let (mut progress, mut watch) = (|moved| bar.moved(moved), |_: &_| {});
+            let bar = TransferProgress::new(global.shows_progress());
+            let (mut progress, mut watch) = (|moved| bar.show_bytes(moved), |_: &_| {});
             let mut options =
                 WriteOptions { form, blocks: self.block.into(), ..WriteOptions::new(&mut progress, &mut watch) };
             for (at, bytes, data_type) in ready {

@@ -4,7 +4,7 @@ use super::Global;
 use super::args::Nodes;
 use super::autozero::run_each;
 use crate::bus::claim::Claim;
-use crate::tasks::autozero::{Action, Limit, Options, autozero, undo_tare};
+use crate::tasks::autozero::{Limit, Options, ZeroTarget, autozero, undo_tare};
 use clap::Args;
 
 /// Set the net value of a channel to zero (6139h), or undo this
@@ -37,7 +37,7 @@ impl Tare {
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let options = Options {
-            action: Action::Tare,
+            target: ZeroTarget::Tare,
             channel: self.channel,
             limit: Limit::Default,
             samples: 10,

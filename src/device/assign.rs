@@ -116,7 +116,7 @@ pub struct RateTable {
 pub enum RateSource {
     /// The description of the device.
     Device,
-    /// CiA 305: the device's own table is unknown.
+    /// The table of CiA 305, because that of the device is unknown.
     Standard,
 }
 
@@ -125,7 +125,7 @@ const STANDARD: [(u8, u32); 8] =
     [(0, 1_000_000), (1, 800_000), (2, 500_000), (3, 250_000), (4, 125_000), (6, 50_000), (7, 20_000), (8, 10_000)];
 
 impl RateTable {
-    /// The table of a device, or the table of CiA 305 if its own is unknown.
+    /// The table of a device, or the table of CiA 305 if that of the device is unknown.
     pub fn of(description: Option<&Description>) -> RateTable {
         let own = description.filter(|description| !description.bit_rates.is_empty());
         let auto = description.and_then(|description| description.auto_bit_rate);
@@ -209,7 +209,7 @@ mod tests {
         assert_eq!(mh4.preferred_assign().map(|entry| entry.kind), Some(AssignKind::Lss));
         let objects = mh4.assign_of_kind(AssignKind::Objects).expect("2320h and 2321h");
         assert_eq!(objects.node_id.map(|place| place.encode(3)), Some(Ok(b"\x03set".to_vec())));
-        // HYDAC and Baumer take plain numbers without a signature.
+        // HYDAC and Baumer accept plain numbers without a signature.
         let baumer = description("baumer");
         let objects = baumer.preferred_assign().expect("2100h and 2101h");
         assert_eq!(objects.node_id.map(|place| place.encode(3)), Some(Ok(vec![3])));

@@ -42,7 +42,7 @@ pub struct MadeFor {
 }
 
 impl MadeFor {
-    /// Whether a device can be this one: vendor and product agree. Unknown numbers are not compared.
+    /// Whether a device may be of this kind: vendor and product agree. Unknown numbers are not compared.
     pub fn fits(&self, vendor: Option<u32>, product: Option<u32>) -> bool {
         same(self.vendor, vendor) && same(self.product, product)
     }
@@ -76,8 +76,8 @@ pub struct Traits {
 }
 
 impl Model {
-    /// Whether the process values have the types that CiA 404 gives their indices, and nothing stands for another scale.
-    /// Only such a description may be used for a similar device of another vendor.
+    /// Whether the process values have the types of CiA 404 and no scale of their own. Only such a description may be
+    /// used for a similar device of another vendor.
     pub fn has_standard_values(&self) -> bool {
         let mut entries = self.dictionary.iter();
         entries.all(|entry| {
@@ -110,7 +110,7 @@ impl Model {
         Ok(Model { description, dictionary, untyped: BTreeSet::new(), made_for: vec![made_for], warnings: Vec::new() })
     }
 
-    /// The objects and types of an EDS or DCF file. It has no signals: those follow from the objects of CiA 404.
+    /// The objects and types of an EDS or DCF file. It has no signals: they are derived from the objects of CiA 404.
     pub fn from_eds(eds: &Eds) -> Model {
         let description = Description {
             name: "eds".to_owned(),
@@ -171,7 +171,7 @@ impl Model {
         })
     }
 
-    /// Whether the same devices are recognised by both.
+    /// Whether both descriptions recognise the same devices.
     pub fn is_for_the_same_device(&self, other: &Model) -> bool {
         let key = |model: &Model| {
             let identify = model.description.identify.clone();
@@ -180,7 +180,7 @@ impl Model {
         !self.description.identify.is_empty() && key(self) == key(other)
     }
 
-    /// How specific the description is: it has priority over one that asks for less. The identity counts first.
+    /// How specific the description is. A more specific one has priority; the identity is compared first.
     fn rank(&self) -> (usize, usize) {
         let identify = &self.description.identify;
         (identify.identity_count(), identify.confirm.len())
@@ -191,7 +191,7 @@ impl Model {
 static OWN: OnceLock<Vec<Arc<Model>>> = OnceLock::new();
 
 /// Adds the descriptions of the user. They have priority over the built-in ones. Only the first call has an effect, and
-/// only before a description is looked for.
+/// only before the first search for a description.
 pub fn add_own(models: Vec<Arc<Model>>) {
     let _ = OWN.set(models);
 }
@@ -213,7 +213,7 @@ pub fn built_in() -> &'static [Arc<Model>] {
     MODELS.get_or_init(|| (0..FILES.len()).filter_map(file).collect())
 }
 
-/// One built-in description. It is parsed when it is first needed: most commands need one of them.
+/// One built-in description, parsed at its first use: most commands need only one.
 fn file(index: usize) -> Option<Arc<Model>> {
     static MODELS: [OnceLock<Option<Arc<Model>>>; FILES.len()] = [const { OnceLock::new() }; FILES.len()];
     let (_, text) = FILES.get(index)?;
@@ -238,8 +238,8 @@ pub fn by_name(name: &str) -> Option<Arc<Model>> {
     file(names().position(|other| other == name)?)
 }
 
-/// The description that asks for this vendor-ID and product code, if there is exactly one. It serves for
-/// devices of which nothing else is known.
+/// The description with this vendor-ID and product code, if there is exactly one. Used for devices with no other known
+/// facts.
 pub fn by_identity(vendor: u32, product: u32) -> Option<Arc<Model>> {
     let wanted = (Some(vendor), Some(product));
     let mut fitting = all().filter(|model| {
@@ -254,8 +254,8 @@ pub fn has_vendor(vendor: u32) -> bool {
     built_in().iter().any(|model| model.description.identify.vendor_id == Some(vendor))
 }
 
-/// The objects that must be read before [`recognise`] can decide: empty if it has decided, or if no description
-/// can fit. Put the bytes received into [`Traits::answers`].
+/// The objects that must be read before
+/// [`recognise`] can decide. Empty if they are not needed, or if no description can fit. Put the bytes received into [`Traits::answers`].
 pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {
     // Further answers cannot change a decision by identity: only a description with a longer identity would win.
     let decided = recognise(traits).map_or(0, |model| model.rank().0);
@@ -363,7 +363,7 @@ mod tests {
                 device_name: wanted.device_name.clone(),
                 answers: BTreeMap::new(),
             };
-            // A description without an identity is used only if it is named.
+            // A description without an identity is used only if the user names it.
             assert_eq!(model.has_identity(&own), !wanted.is_empty(), "{}", model.description.name);
             let other = |number: Option<u32>| number.map(|number| number ^ 1);
             let others = [
@@ -417,7 +417,7 @@ mod tests {
                 continue;
             }
             for object in to_ask(&traits) {
-                // It refuses objects that other descriptions ask for.
+                // The device rejects objects that only other descriptions contain.
                 let Some(entry) = model.dictionary.get(object) else { continue };
                 let mut bytes = entry.default_bytes(node()).expect("a default");
                 bytes.resize(4, 0xff);
@@ -446,7 +446,7 @@ mod tests {
         traits.answers.insert(fixed_mapping[0], vec![0x20, 0x01, 0x30, 0x61]);
         assert_eq!(recognise(&traits).map(|model| model.description.name.clone()), None);
         assert_eq!(to_ask(&traits), [fixed_mapping[1], scaling[2]]);
-        // A device that answers nothing is not asked for more.
+        // If a device does not answer, no further objects are read.
         assert_eq!(to_ask(&Traits::default()), []);
         assert_eq!(recognise(&Traits::default()).map(|model| model.description.name.clone()), None);
     }

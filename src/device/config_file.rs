@@ -1,6 +1,7 @@
 //! A file with the settings of a device (`config dump`, `config apply`): TOML, flattened into keys with their places.
 //!
-//! The keys are paths: `event-timer` below `[tpdo.1]` is `tpdo.1.event-timer`. What a key means is not known here.
+//! The keys are paths: `event-timer` below `[tpdo.1]` is `tpdo.1.event-timer`. This module does not know the meaning of
+//! the keys.
 
 use std::fmt;
 use toml::Spanned;
@@ -32,7 +33,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// A value of a file, as it is written.
+/// A value as written in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
     /// `"100ms"`.
@@ -45,7 +46,7 @@ pub enum Item {
     Flag(bool),
     /// `["pressure", "pressure.status"]`.
     List(Vec<String>),
-    /// Anything else: what it is.
+    /// Any other type, with its name.
     Other(&'static str),
 }
 

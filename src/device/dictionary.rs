@@ -92,8 +92,7 @@ impl Dictionary {
         self.entries.range(ObjectId::new(index, 0)..=ObjectId::new(index, 255)).next().is_some()
     }
 
-    /// The entry with a name: `vendor-id`, `ai-input-pv:1`, or as an EDS spells it, `Position Value`. Letter case is
-    /// ignored.
+    /// The entry with a name: `vendor-id`, `ai-input-pv:1`, or as in an EDS, `Position Value`. Letter case is ignored.
     pub fn find(&self, name: &str) -> Option<&Entry> {
         let exact = self.find_exact(&name.to_lowercase());
         exact.or_else(|| spellings(name).into_iter().find_map(|name| self.find_exact(&name)))
@@ -122,7 +121,7 @@ impl Dictionary {
     }
 }
 
-/// The names that `Position Value:1`, as an EDS spells it, can have: with sub-index, and as a whole.
+/// The possible names for a name as in an EDS (`Position Value:1`): with sub-index, and as a whole.
 pub fn spellings(name: &str) -> Vec<String> {
     let with_sub = name.rsplit_once(':').filter(|(_, sub)| sub.parse::<u8>().is_ok());
     let with_sub = with_sub.map(|(name, sub)| format!("{}:{sub}", slug(name)));

@@ -105,7 +105,7 @@ pub fn measured(profile: u32) -> &'static [Measured] {
     }
 }
 
-/// The other objects of a profile that have a name here.
+/// The other named objects of a profile.
 fn settings(profile: u32) -> &'static [Measured] {
     const ENCODER_SETTINGS: &[Measured] = &[
         one(0x6000, "operating-parameters"),
@@ -138,7 +138,7 @@ fn settings(profile: u32) -> &'static [Measured] {
     }
 }
 
-/// The settings of a profile that have a name here; of an array the first two entries.
+/// The named settings of a profile; of an array only the first two entries.
 pub fn settings_of(profile: u32) -> impl Iterator<Item = ObjectId> {
     let subs = |row: &Measured| if row.is_array { 1..=2 } else { 0..=0 };
     settings(profile).iter().flat_map(move |row| subs(row).map(|sub| ObjectId::new(row.index, sub)))
@@ -169,7 +169,7 @@ pub fn find(profile: u32, text: &str) -> Option<ObjectId> {
     name(profile, object).filter(|name| *name == text).map(|_| object)
 }
 
-/// The object that gives the step of an integer, the unit, and the decimal digits of the step in this unit.
+/// The step of an integer: its object, its unit, and its decimal digits in this unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
     /// The object with the step.
@@ -248,7 +248,7 @@ const INCLINOMETER_OBJECTS: &[Row] = &[
     (0x6020, 0x6020, I16),
     (0x6021, 0x6021, U8),
     (0x6022, 0x6024, I16),
-    // The same with 32 bits.
+    // Longitudinal and lateral slope, 32 bits.
     (0x6110, 0x6110, I32),
     (0x6111, 0x6111, U8),
     (0x6112, 0x6114, I32),

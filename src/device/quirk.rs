@@ -1,12 +1,12 @@
 //! Deviations of real devices that data cannot express, each with a name.
 
-/// A deviation from the standard. Each acts in one place, which names it.
+/// A deviation from the standard. Each one is handled in one place in the code, which mentions its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quirk {
     /// Uploads are answered with command specifier 60h and the data.
     ///
     /// Device: Honeywell DPS. Evidence: manual 50085804, table 19: both reads are answered with 60h. Trigger: an
-    /// expedited upload. Not set by default: no sensor is known to do so, and 60h is the acknowledge of a write.
+    /// expedited upload. Not set by default: no sensor is known to do so, and 60h acknowledges a write.
     UploadAnswered60,
     /// Storing everything (1010h:1) resets the COB-IDs of 1014h and 180xh:1 to their defaults; storing the
     /// communication parameters (1010h:2) keeps them.

@@ -1,4 +1,4 @@
-//! How a description scales a number, and which bits and numbers report a bad value.
+//! Scaling of numbers, and the bits and numbers that report a bad value.
 
 use std::str::FromStr;
 
@@ -16,7 +16,7 @@ impl Decimal {
     pub const ONE: Decimal = Decimal { mantissa: 1, digits: 0 };
     /// The number 0.
     pub const ZERO: Decimal = Decimal { mantissa: 0, digits: 0 };
-    /// More digits are not exact in any type.
+    /// No type represents more digits exactly.
     const MAX_DIGITS: usize = 15;
 
     /// `mantissa` divided by ten to the power of `digits`, without zeros at the end.
@@ -67,14 +67,14 @@ pub struct Scale {
     pub offset: Decimal,
 }
 
-/// Something for each way in which a value is bad.
+/// One item for each kind of bad value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bad<T> {
-    /// Not valid.
+    /// For a value that is not valid.
     pub invalid: T,
-    /// Above the measuring range.
+    /// For a value above the measuring range.
     pub high: T,
-    /// Below the measuring range.
+    /// For a value below the measuring range.
     pub low: T,
 }
 
@@ -92,7 +92,7 @@ impl StatusBits {
     }
 }
 
-/// Numbers that take the place of a value.
+/// Numbers that replace a value.
 pub type Markers = Bad<Vec<i64>>;
 
 impl Default for Markers {

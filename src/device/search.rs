@@ -5,8 +5,8 @@ use super::dictionary::Entry;
 use crate::canopen::object::ObjectId;
 
 impl Model {
-    /// The objects that `query` means, in ascending order: an address (`6130:1`), every sub-index of an index (`6130`),
-    /// a name, or else a word in the name, the meaning or the values. Letter case is ignored.
+    /// The objects that match `query`, in ascending order. `query` is an address (`6130:1`), an index (`6130`), a name,
+    /// or a word in the name, the meaning or the values. Letter case is ignored.
     pub fn search(&self, query: &str) -> Vec<&Entry> {
         let query = query.trim();
         if let Ok(object) = query.parse::<ObjectId>() {

@@ -1,7 +1,7 @@
 //! Sensor types as coded in 6110h (CiA 404-1).
 
-/// Codes and their meanings: 2 (HBM MC1609), 90 and 100 (WIKA MH-4-CAN, HYDAC) from manuals; the others are general
-/// knowledge of CiA 404, no page at hand.
+/// Codes and their meanings: 2 (HBM MC1609), 90 and 100 (WIKA MH-4-CAN, HYDAC) from manuals. The others are general
+/// knowledge of CiA 404, without a page reference.
 const KINDS: [(u16, &str); 16] = [
     (1, "thermocouple J"),
     (2, "thermocouple K"),

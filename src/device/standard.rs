@@ -1,7 +1,7 @@
 //! Objects that have the same type on every device (CiA 301, CiA 404).
 //!
-//! This is a table and not a description: every `sdo read` looks here first, and a file with thousands of entries would
-//! take most of the program's time.
+//! A table and not a description file, because each `sdo read` uses it: parsing a file with thousands of entries would
+//! take most of the run time.
 //!
 //! Objects whose type differs between devices (6130h is INTEGER32 on the DPS) are missing: their type comes from a
 //! description.
@@ -148,7 +148,7 @@ pub fn single_objects() -> impl Iterator<Item = ObjectId> {
     single.map(|row| ObjectId::new(row.index, row.first))
 }
 
-/// Every name, a run once with its first sub-index, for suggestions of the nearest name.
+/// Every name, for suggestions. A run is listed once, with its first sub-index.
 pub fn names() -> impl Iterator<Item = String> {
     let plain = ROWS.iter().filter_map(|row| entry(ObjectId::new(row.index, row.first)));
     let pdos = [(COMMUNICATION, 0x1800), (MAPPING, 0x1a00)];

@@ -40,10 +40,9 @@ const fn scaled(code: u8, symbol: &'static str, quantity: Quantity, factor: f64,
 const PSI_PA: f64 = 0.453_592_37 * 9.806_65 / (0.0254 * 0.0254);
 
 /// Sources: DRP-303-2 V1.1, except 2Dh (MH-4, MC1609), 4Eh, ABh, ACh (MH-4, DPS), 26h (esd CAN-CBX-THERMO) and 41h
-/// (Epson).
-/// 40h-4Ch without 41h and 25h-32h without 26h: general knowledge of CiA 303-2, no page at hand.
+/// (Epson). 40h-4Ch without 41h and 25h-32h without 26h: general knowledge of CiA 303-2, without a page reference.
 ///
-/// A new unit is one line here.
+/// To add a unit, add one line.
 const BASES: &[Base] = &[
     scaled(0x01, "m", Quantity::Length, 1.0, 0.0),
     scaled(0x02, "kg", Quantity::Mass, 1.0, 0.0),
@@ -269,7 +268,7 @@ mod tests {
 
     #[test]
     fn no_two_codes_have_the_same_symbol() {
-        // Found by fuzzing: centi-days had the symbol of candela, and m/rad could not be typed.
+        // Centi-days must not have the symbol of candela, and m/rad must be possible.
         let mut shown = std::collections::BTreeMap::new();
         for base in BASES {
             for (power, _) in PREFIXES {

@@ -12,10 +12,10 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, TransferError, Uploaded, Violation};
 use std::time::Duration;
 
-/// A transfer may take this long, whatever it transfers.
+/// The time allowed for any transfer.
 const SLOW_TRANSFER: Duration = Duration::from_secs(5);
 
-/// And this long for each byte: a full segment needs less than 0.2 s also on a loaded bus with 10 kbit/s.
+/// The time allowed for each byte. A full segment needs less than 0.2 s, also on a loaded bus with 10 kbit/s.
 const SLOWEST_BYTE: Duration = Duration::from_millis(30);
 
 /// A transfer in progress.
@@ -29,22 +29,22 @@ pub(super) struct Active {
     /// The number of our frames that still wait to be sent.
     pub(super) unsent: usize,
     pub(super) attempts_left: u32,
-    /// How often a read that fails in the middle starts again from its initiate.
+    /// How often a read that fails in the middle is restarted.
     pub(super) restarts_left: u32,
-    /// A read was rejected because of a transfer that the node still had in progress. It was repeated.
+    /// Whether a read was rejected because the node still had a transfer in progress. The read was repeated.
     pub(super) was_rejected: bool,
-    /// When the first request was sent. Earlier frames do not answer it.
+    /// When the first request was sent. Earlier frames cannot answer the request.
     pub(super) asked_at: Option<Mono>,
     /// When the device began to answer.
     pub(super) begun_at: Option<Mono>,
     pub(super) foreign: ForeignTraffic,
-    /// The caller's transfer. It waits while this one, a barrier read, makes sure that no stale answer is pending.
+    /// The transfer of the caller. It waits for a barrier read, which makes sure that no stale answer is pending.
     pub(super) deferred: Option<(Ticket, Request)>,
-    /// Another master wrote the same object. Its acknowledge looks like ours.
+    /// Another master wrote the same object. The acknowledgements of both writes are equal.
     pub(super) ambiguous: bool,
     /// The bytes of a first read whose length is doubtful. The object is read once more.
     pub(super) doubtful: Option<Vec<u8>>,
-    /// The request was sent more than once, so more than one answer may come.
+    /// Whether the request was sent more than once. More than one answer may come then.
     pub(super) is_repeated: bool,
 }
 
@@ -85,8 +85,8 @@ impl Active {
         }
     }
 
-    /// Checks the length of the bytes read. If it contradicts the announced one, the object is read once more. The same
-    /// bytes are then accepted, with a note.
+    /// Checks the length of the bytes read. If the length differs from the announced one, the object is read once more.
+    /// If the bytes are the same, they are accepted with a note.
     pub(super) fn check_length(&mut self, uploaded: Option<&Uploaded>, accept_60: bool) -> LengthCheck {
         let Some(uploaded) = uploaded else { return LengthCheck::Accepted };
         match self.doubtful.take() {
@@ -101,7 +101,7 @@ impl Active {
         }
     }
 
-    /// The failure of a transfer that unexpected frames disturbed.
+    /// The failure of a transfer that was disturbed by unexpected frames.
     pub(super) fn disturbance(&self) -> SdoFailure {
         if self.foreign.is_requested() { SdoFailure::Disturbed } else { SdoFailure::TwoDevices(None) }
     }
@@ -118,16 +118,15 @@ impl Active {
         }
     }
 
-    /// Whether a frame answers a segment that still waits to be sent. Then it comes from another device with the same
-    /// node-ID. Not checked for an initiate, which may be a retry of an answered one, and for an abort, which may come
-    /// at any time.
+    /// Whether a frame answers a segment that is not sent yet. The frame then comes from another device with the same
+    /// node-ID. Initiate requests are not checked, because they may be retries. Aborts may come at any time.
     pub(super) fn is_answered_before_sent(&self, frame: &Frame) -> bool {
         let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
         self.unsent > 0 && in_segments && frame.data().first() != Some(&0x80)
     }
 
-    /// Waits for a foreign transfer to end, then restarts; `false` if the transfer must not be repeated or the time for
-    /// that is over. No abort is sent, because it would end the foreign transfer.
+    /// Waits for a foreign transfer to end, then restarts. `false` if the transfer must not be repeated, or if the time
+    /// limit has passed. No abort is sent, because it would end the foreign transfer.
     pub(super) fn back_off(&mut self, accept_60: bool, now: Mono, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let limit = self.timeout(timing) * (1 + timing.retries);
         if !self.request.repeatable || !self.foreign.back_off(now, limit) {
@@ -140,7 +139,7 @@ impl Active {
         true
     }
 
-    /// Records a foreign frame. Whether our transfer can continue.
+    /// Records a foreign frame. Returns whether our transfer can continue.
     pub(super) fn record_foreign(
         &mut self,
         accept_60: bool,
@@ -175,8 +174,8 @@ impl Active {
         out.push(self.machine.request());
     }
 
-    /// Starts a read again from its initiate after this failure; `false` if that must not be or would not help. `out` has
-    /// the abort for the server.
+    /// Restarts a read after this failure. `false` if a restart is not allowed or would not help. `out` contains the
+    /// abort for the server.
     pub(super) fn restart(
         &mut self,
         error: TransferError,
@@ -187,7 +186,7 @@ impl Active {
         let has_begun = self.machine.has_begun();
         let is_rejected = error == TransferError::Aborted(AbortCode::COMMAND_SPECIFIER);
         if !has_begun && is_rejected && self.request.may_restart() && !self.was_rejected {
-            // A server with an interrupted transfer rejects the first request, and then is free.
+            // A server with an interrupted transfer rejects the first request, and accepts the next one.
             self.was_rejected = true;
         } else if has_begun && is_of_transmission(error) && self.restarts_left > 0 {
             self.restarts_left -= 1;
@@ -208,8 +207,8 @@ impl Active {
         if matches!(error, TransferError::Violation(Violation::Crc, _)) {
             return self.request.operation() == Operation::Read && self.request.falls_back();
         }
-        // An abort code about the object itself would come again. A write with an unknown answer may have had an
-        // effect and is not repeated.
+        // An abort code about the object itself would be repeated. A write with an unknown answer is not repeated,
+        // because it may have had an effect.
         let refused = match error {
             TransferError::Aborted(code) => !is_about_object(code),
             TransferError::Violation(..) => self.request.operation() == Operation::Read,
@@ -238,8 +237,8 @@ impl Active {
         self.request.timeout.unwrap_or(timing.timeout)
     }
 
-    /// How long a transfer may take since the device began to answer. A device can send one byte in each segment, and
-    /// each just in time.
+    /// The time limit of a transfer, from the first answer of the device. Without the limit, a device could send one
+    /// byte per segment, each just before the time-out.
     pub(super) fn time(&self, timing: &Timing) -> Duration {
         let bytes = u32::try_from(self.machine.moved().0).unwrap_or(u32::MAX);
         SLOW_TRANSFER.max(self.timeout(timing).saturating_mul(10)).saturating_add(SLOWEST_BYTE * bytes)
@@ -254,14 +253,15 @@ impl Active {
         self.request.error(failure)
     }
 
-    /// An error that names the deferred request, except a write that was never sent.
+    /// An error for the deferred request, unless that is a write that was never sent.
     pub(super) fn error_of_sent(&self, failure: SdoFailure) -> SdoError {
         let was_sent = |request: &Request| request.operation() == Operation::Read || request.refused_blocks;
         let deferred = self.deferred.as_ref().map(|(_, request)| request).filter(|request| was_sent(request));
         deferred.unwrap_or(&self.request).error(failure)
     }
 
-    /// Records a request of another master. If it writes the same object, an acknowledge may be for either of us.
+    /// Records a request of another master. If it writes the same object, an acknowledgement may belong to either
+    /// write.
     pub(super) fn record_request(&mut self, frame: &Frame) {
         if let [command, a, b, c, ..] = frame.data() {
             let same = ObjectId::from_multiplexer([*a, *b, *c]) == self.request.object;

@@ -1,10 +1,10 @@
 //! Detects another master on the same SDO channel.
 //!
 //! An SDO server carries out one transfer at a time. If another master starts a segmented transfer during ours, the
-//! server continues with theirs. A segment does not name its transfer, so our next seven bytes may come from another
-//! object, or from the start of the object.
+//! server continues with the new one. A segment does not identify its transfer. So our next seven bytes may come from
+//! another object, or from the start of the object.
 //!
-//! Two kinds show such a transfer. Each request that we receive is foreign, because a bus does not return our own
+//! Two kinds of frames show such a transfer. Each received request is foreign, because a bus does not return our own
 //! frames. And the server announces each segmented transfer that it starts.
 //!
 //! In that case our transfer waits until the foreign one has ended, and then restarts. A foreign expedited transfer
@@ -109,7 +109,7 @@ impl ForeignTraffic {
     /// `announced` and `delivered` are sizes in bytes.
     pub(super) fn is_suspect(self, announced: Option<u32>, delivered: usize) -> bool {
         let as_announced = announced.is_none_or(|size| usize::try_from(size) == Ok(delivered));
-        // A master that interfered once uses the channel, even if it was not received again.
+        // A master that interfered once may still use the channel, even if no further request was received.
         self.in_segments || (self.seen || self.since.is_some()) && !as_announced
     }
 
@@ -123,7 +123,7 @@ impl ForeignTraffic {
             }
     }
 
-    /// Makes our transfer wait for the foreign one. `false` if it has backed off for `limit` already.
+    /// Makes our transfer wait for the foreign one. `false` if our transfer has already waited for `limit`.
     pub(super) fn back_off(&mut self, now: Mono, limit: Duration) -> bool {
         let since = *self.since.get_or_insert(now);
         let others = ForeignTraffic { seen: false, in_segments: false, ..*self };
@@ -136,7 +136,7 @@ impl ForeignTraffic {
         self.back_off_until
     }
 
-    /// Restarts our transfer: earlier frames no longer count.
+    /// Records that our transfer restarts: earlier frames no longer count.
     pub(super) fn restart(&mut self) {
         *self = ForeignTraffic { since: self.since, requested: self.requested, ..ForeignTraffic::default() };
     }

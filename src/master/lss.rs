@@ -1,8 +1,8 @@
 //! LSS over a bus: sets node-ID and bit rate (CiA 305).
 //!
-//! A slave in configuration state also executes commands that are meant for another slave. So an [`Lss`] remembers
-//! whether a slave may be in that state. When it is dropped, also after Ctrl-C, it switches all slaves to waiting
-//! state.
+//! A slave in configuration state also executes commands that are meant for another slave. So an
+//! [`Lss`] remembers whether a slave may be in that state. When the [`Lss`] is dropped, also after Ctrl-C, it switches
+//! all slaves to waiting state.
 
 mod error;
 mod scan;
@@ -24,7 +24,7 @@ pub const STORE_TIMEOUT: Duration = Duration::from_secs(3);
 /// The pause after a frame without an answer. Some slaves can buffer only one frame.
 const FRAME_PAUSE: Duration = Duration::from_millis(2);
 
-/// The pause between frames that are repeated, for slow slaves. python-canopen waits as long.
+/// The pause between repeated frames, for slow slaves. python-canopen uses the same pause.
 const RETRY_PAUSE: Duration = Duration::from_millis(200);
 
 /// The wait for answers of further slaves after the first answer.
@@ -38,7 +38,7 @@ const MAX_FAULTS: usize = 64;
 enum Until {
     /// Shortly after the first answer.
     Answer,
-    /// At the time-out, so that all slaves can answer.
+    /// At the time-out. All slaves have time to answer.
     Timeout,
 }
 
@@ -60,7 +60,7 @@ impl<T> Gathered<T> {
     }
 }
 
-/// Whether there are further slaves with the same vendor and product.
+/// The search result for further slaves with the same vendor and product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Others {
     /// The slave supports the service, and no other slave answers.
@@ -120,7 +120,7 @@ impl<'bus> Lss<'_, 'bus> {
         self.is_configuring
     }
 
-    /// The boot-up messages received during LSS services. A slave that had no node-ID boots when it is switched to
+    /// The boot-up messages received during LSS services. A slave without a node-ID boots when it is switched to
     /// waiting state.
     pub fn boot_ups(&self) -> &BTreeMap<NodeId, Stamp> {
         &self.boot_ups
@@ -197,28 +197,28 @@ impl<'bus> Lss<'_, 'bus> {
         Ok(LssAddress::new(numbers))
     }
 
-    /// Sets the node-ID of the slave in configuration state (11h); `None` removes it. It takes effect after a reset, or
-    /// for a slave without node-ID when it is switched to waiting state.
+    /// Sets the node-ID of the slave in configuration state (11h); `None` removes it. The node-ID takes effect after a
+    /// reset. For a slave without a node-ID, it takes effect when the slave is switched to waiting state.
     ///
     /// # Errors
-    /// The slave rejects it or does not answer, or several answer.
+    /// The slave rejects the request or does not answer, or several slaves answer.
     pub fn configure_node_id(&mut self, node: Option<NodeId>) -> Result<(), LssError> {
         self.one(Exchange::new(Request::ConfigureNodeId(node)), self.master.timing.retries).map(|_| ())
     }
 
-    /// Sets the bit rate of the slave in configuration state by a table index (13h). Table 0 is that of CiA 305. It
-    /// takes effect after [`Lss::activate`] or a reset.
+    /// Sets the bit rate of the slave in configuration state by a table index (13h). Table 0 is that of CiA 305. The
+    /// bit rate takes effect after [`Lss::activate`] or a reset.
     ///
     /// # Errors
-    /// The slave rejects it or does not answer, or several answer.
+    /// The slave rejects the request or does not answer, or several slaves answer.
     pub fn configure_bit_timing(&mut self, table: u8, index: u8) -> Result<(), LssError> {
         let request = Request::ConfigureBitTiming { table, index };
         self.one(Exchange::new(request), self.master.timing.retries).map(|_| ())
     }
 
-    /// Activates the new bit rate (15h). The slaves in configuration state stop sending for this many milliseconds,
-    /// change the bit rate, and wait the same time again. Slaves do not answer. The command back to waiting state must
-    /// be sent at the new bit rate.
+    /// Activates the new bit rate (15h). The slaves in configuration state stop sending for
+    /// `delay_ms`, change the bit rate, and wait for `delay_ms` again. Slaves do not answer. The command back to
+    /// waiting state must be sent at the new bit rate.
     ///
     /// # Errors
     /// The bus failed or the user interrupted.
@@ -230,7 +230,7 @@ impl<'bus> Lss<'_, 'bus> {
     /// sent once. The time-out is at least [`STORE_TIMEOUT`].
     ///
     /// # Errors
-    /// The slave rejects it or does not answer, or several answer.
+    /// The slave rejects the request or does not answer, or several slaves answer.
     pub fn store(&mut self) -> Result<(), LssError> {
         self.one(Exchange::new(Request::Store), 0).map(|_| ())
     }
@@ -251,7 +251,7 @@ impl<'bus> Lss<'_, 'bus> {
         self.ask_all(Exchange::new(Request::IdentifyUnconfigured)).map(|exchange| exchange.has_answer())
     }
 
-    /// Whether there are further slaves with the vendor and product of this one (46h to 4Bh).
+    /// Searches for further slaves with the vendor and product of this one (46h to 4Bh).
     ///
     /// # Errors
     /// The bus failed, the user interrupted, or an answer violates the protocol.
@@ -272,7 +272,7 @@ impl<'bus> Lss<'_, 'bus> {
         Ok(Others::None)
     }
 
-    /// Carries out a service that all matching slaves answer in the same way. No answer is a result too.
+    /// Carries out a service that all matching slaves answer in the same way. No answer is also a valid result.
     fn ask_all(&mut self, mut exchange: Exchange) -> Result<Exchange, LssError> {
         self.carry_out(&mut exchange, Until::Answer, self.master.timing.retries)?;
         Ok(exchange)
@@ -317,7 +317,7 @@ impl<'bus> Lss<'_, 'bus> {
         if exchange.service() == Service::Store { timeout.max(STORE_TIMEOUT) } else { timeout }
     }
 
-    /// Sends a request and waits for answers; repeats it if there is none.
+    /// Sends a request and waits for answers. Repeats the request if there is no answer.
     fn carry_out(&mut self, exchange: &mut Exchange, until: Until, retries: u32) -> Result<(), LssError> {
         // Frames received before the request do not answer it.
         self.discard_received()?;
@@ -363,7 +363,7 @@ impl<'bus> Lss<'_, 'bus> {
                 Err(error) => Err(error.into()),
             };
             match step {
-                // The frame was sent while waiting, and this may be the answer.
+                // The frame was sent while waiting, so the received frame may be the answer.
                 Ok(Some(received)) if !self.master.is_sending() => self.master.pending = Some(received),
                 Ok(_) => {}
                 Err(error) => {

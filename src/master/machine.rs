@@ -88,7 +88,7 @@ impl Machine {
         }
     }
 
-    /// The bus has taken a frame of the transfer.
+    /// The bus has accepted a frame of the transfer.
     pub(super) fn on_sent(&mut self) {
         if let Machine::WriteBlocks(download) = self {
             download.on_sent();

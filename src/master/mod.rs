@@ -5,18 +5,18 @@
 //! returns what happened. All blocking functions are built on it.
 
 mod active;
-mod clues;
 mod foreign_traffic;
 pub mod lss;
 mod machine;
+mod missed_answer;
 mod request;
 mod sdo;
 mod second_answer;
 mod send;
 pub mod transfer;
 
-pub use clues::Clue;
 pub use lss::{Lss, LssError};
+pub use missed_answer::MissedAnswer;
 pub use request::{Answer, NUMBER_LIMIT, Operation, Request, SdoError, SdoFailure, TEXT_LIMIT, Ticket};
 pub use second_answer::{OnTwoDevices, SecondAnswer};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, TransferKind, read_object, write_object};
@@ -32,7 +32,7 @@ use sdo::SdoClient;
 use send::Outgoing;
 use std::time::Duration;
 
-/// The longest time that [`Master::drain`] accepts frames after its moment.
+/// How long [`Master::drain`] accepts frames after `stop`.
 const DRAIN_LIMIT: Duration = Duration::from_secs(1);
 
 const SERIAL_NUMBER: ObjectId = ObjectId::new(0x1018, 4);
@@ -104,7 +104,7 @@ pub struct Master<'bus> {
     outgoing: Outgoing,
     /// A frame that was received after the deadline. It is handled next.
     pending: Option<Received>,
-    /// The latest known moment. It saves readings of the clock.
+    /// The latest known moment, stored to read the clock less often.
     seen: Mono,
 }
 
@@ -169,13 +169,14 @@ impl<'bus> Master<'bus> {
         self.outgoing.push(frame, None);
     }
 
-    /// Queues a frame before all waiting frames, so that a SYNC does not wait for SDO requests. `false` if the
-    /// previous one still waits; then the frame is not queued again.
+    /// Queues a frame before all waiting frames, so that a SYNC does not wait for SDO requests. `false` if the previous
+    /// frame still waits; then the new frame is not queued.
     pub fn send_first(&mut self, frame: Frame) -> bool {
         self.outgoing.push_first(frame)
     }
 
-    /// When the bus took the frame of [`Master::send_first`], returned once. `None` if it still waits or was dropped.
+    /// When the bus accepted the frame of [`Master::send_first`], returned once. `None` if it still waits or was
+    /// dropped.
     pub fn take_first_at(&mut self) -> Option<Mono> {
         self.outgoing.take_first_at()
     }
@@ -190,14 +191,14 @@ impl<'bus> Master<'bus> {
         self.bus.late_drops()
     }
 
-    /// Sets whether an interface that is down and a bus without acknowledge are tolerated. If so, frames that cannot be
-    /// sent are dropped. If not, both are errors, which is the default.
+    /// Sets whether an interface that is down and a bus without acknowledgement are tolerated. If so, frames that
+    /// cannot be sent are dropped. If not, both are errors, which is the default.
     pub fn set_tolerates_outages(&mut self, tolerates_outages: bool) {
         self.outgoing.set_tolerates_outages(tolerates_outages);
     }
 
     /// Starts an SDO transfer. Its result comes as [`Happening::Sdo`] with the returned ticket. Each node has one
-    /// transfer at a time; further ones wait.
+    /// transfer at a time; further transfers wait.
     pub fn start(&mut self, request: Request) -> Ticket {
         self.sdo.submit(request)
     }
@@ -217,7 +218,7 @@ impl<'bus> Master<'bus> {
         self.sdo.second_answers().collect()
     }
 
-    /// The nodes whose heartbeats have not one byte, and the length of the first such heartbeat.
+    /// The nodes with heartbeats of a length other than one byte, and the length of the first one.
     pub fn odd_heartbeats(&self) -> impl Iterator<Item = (NodeId, usize)> {
         self.sdo.odd_heartbeats()
     }
@@ -228,7 +229,7 @@ impl<'bus> Master<'bus> {
     /// Outer: the bus failed or the user interrupted. Inner: two devices answer.
     pub fn ensure_single(&mut self, node: NodeId) -> Result<Result<(), SdoError>, Error> {
         if self.sdo.needs_check(node) {
-            // A device without a serial number answers as well. A silent one is reported by the write.
+            // A device without a serial number also answers. If the device is silent, the write reports it.
             self.transfer_one(Request::read(node, SERIAL_NUMBER).once())?.ok();
         }
         let operation = Operation::Write;
@@ -236,7 +237,7 @@ impl<'bus> Master<'bus> {
         Ok(self.sdo.failure_of(node, SERIAL_NUMBER).map_or(Ok(()), error))
     }
 
-    /// Waits until no second answer can arrive. Frames go to `watch`. After the first answer of a node only.
+    /// Waits until no second answer can arrive. Frames go to `watch`. Waits only after the first answer of a node.
     pub(super) fn await_second_answers(&mut self, watch: &mut dyn FnMut(&Received)) -> Result<(), Error> {
         while let Some(until) = self.sdo.second_answer_until() {
             match self.next(until)? {
@@ -251,7 +252,7 @@ impl<'bus> Master<'bus> {
         Ok(())
     }
 
-    /// From now on, all transfers together have this time. `None`: no limit.
+    /// Limits the total time of all transfers from now on. `None`: no limit.
     pub fn limit_transfers(&mut self, time: Option<Duration>) {
         let now = self.now();
         self.sdo.limit(time.map(|time| (now + time, time)));
@@ -304,8 +305,8 @@ impl<'bus> Master<'bus> {
 
     /// Waits for the next event. Returns [`Happening::Deadline`] when `until` is reached.
     ///
-    /// The receive time of frames counts. So traffic never extends a deadline, and a slow program never shortens one:
-    /// a frame received after the deadline is handled after it.
+    /// The receive time of a frame decides whether it is in time. So traffic never extends a deadline, and a slow
+    /// program never shortens one.
     ///
     /// # Errors
     /// The bus failed.
@@ -316,8 +317,8 @@ impl<'bus> Master<'bus> {
     /// Returns the next event that was received by the moment `stop`, without waiting. Returns
     /// [`Happening::Deadline`] if there is none.
     ///
-    /// Frames that are already there count up to one second (`DRAIN_LIMIT`) after `stop`, because receive times are
-    /// inaccurate on a busy machine.
+    /// Frames that are already received are accepted up to one second (`DRAIN_LIMIT`) after `stop`, because receive
+    /// times are inaccurate on a busy machine.
     ///
     /// # Errors
     /// The bus failed.
@@ -332,7 +333,7 @@ impl<'bus> Master<'bus> {
                 return Ok(Happening::Sdo(ticket, result));
             }
             let retry_at = self.send_waiting()?;
-            // A transfer with two devices ends before it is sent.
+            // A transfer to a node-ID with two devices ends before its request is sent.
             if self.sdo.has_finished() {
                 continue;
             }
@@ -395,7 +396,7 @@ impl<'bus> Master<'bus> {
     }
 
     /// Carries out transfers in parallel. The results have the order of the requests. Frames that do not belong to
-    /// them go to `watch`. If a node does not answer a request, its other requests end as cancelled.
+    /// these transfers go to `watch`. If a node does not answer a request, its other requests end as cancelled.
     ///
     /// # Errors
     /// The bus failed or the user interrupted. Failures of one device are in its result.

@@ -1,7 +1,7 @@
 //! SDO requests, answers and errors.
 
-use super::clues::Clue;
 use super::machine::Machine;
+use super::missed_answer::MissedAnswer;
 use super::second_answer::SecondAnswer;
 use super::transfer::{Blocks, TransferKind};
 use crate::bus::Stamp;
@@ -31,11 +31,11 @@ pub struct Request {
     pub(super) timeout: Option<Duration>,
     pub(super) repeatable: bool,
     pub(super) blocks: Blocks,
-    /// A read object cannot be longer, in bytes.
+    /// The limit for the size of a read object in bytes.
     limit: usize,
     /// The device rejected block transfer during this request.
     pub(super) refused_blocks: bool,
-    /// A length other than the announced one is always a failure.
+    /// Whether a length other than the announced one is always a failure.
     pub(super) is_exact: bool,
 }
 
@@ -68,13 +68,13 @@ impl Request {
         self
     }
 
-    /// Never accepts a length other than the announced one: for content that a file keeps.
+    /// Never accepts a length other than the announced one. For content that is saved to a file.
     pub fn exact(mut self, is_exact: bool) -> Request {
         self.is_exact = is_exact;
         self
     }
 
-    /// Sets how many bytes a read object has at most, if the caller knows more than its index shows.
+    /// Sets the limit for the size of a read object, if the caller knows more than the index shows.
     pub fn up_to(mut self, limit: usize) -> Request {
         self.limit = limit;
         self
@@ -92,14 +92,14 @@ impl Request {
         self
     }
 
-    /// The same request with the time-out of another one. It is repeated even if the other one must not be, but not
-    /// after a rejected block request, which counts as the first attempt.
+    /// The same request with the time-out of `other`. It is repeated even if `other` must not be repeated. After a
+    /// rejected block request it is not repeated, because that was the first attempt.
     pub(super) fn with_timing_of(mut self, other: &Request) -> Request {
         (self.timeout, self.repeatable) = (other.timeout, !other.refused_blocks);
         self
     }
 
-    /// Whether a failed transfer may start again: a read that is not repeated by its caller.
+    /// Whether a failed transfer may be restarted: only reads that the caller does not repeat.
     pub(super) fn may_restart(&self) -> bool {
         self.repeatable && self.operation() == Operation::Read
     }
@@ -203,14 +203,14 @@ pub enum SdoFailure {
     #[error("refused by the device ({0})")]
     Refused(AbortCode),
     /// The device did not answer in time.
-    #[error("no answer within {}{}{}", format_duration(*.waited), if *.started { " in the middle of the transfer" } else { "" }, received(.clue))]
+    #[error("no answer within {}{}{}", format_duration(*.waited), if *.started { " in the middle of the transfer" } else { "" }, received(.missed))]
     NoAnswer {
         /// The longest wait for one answer.
         waited: Duration,
         /// Whether the device answered before and then stopped.
         started: bool,
         /// The facts that explain the missing answer.
-        clue: Clue,
+        missed: MissedAnswer,
     },
     /// The answer violates the protocol.
     #[error("{0}: {1}")]
@@ -218,10 +218,10 @@ pub enum SdoFailure {
     /// The bytes do not fit the data type.
     #[error("{0}")]
     Fit(FitError),
-    /// A number was needed, and the object holds text or bytes.
+    /// A number was expected, but the object contains text or bytes.
     #[error("the value is not a number")]
     NotANumber,
-    /// Another master wrote the same object at the same time, so the acknowledge may be for its write.
+    /// Another master wrote the same object at the same time, so the acknowledgement may be for its write.
     #[error("acknowledged, but another master wrote the same object at the same time")]
     Ambiguous,
     /// The length contradicts the announced one, or a segment in the middle is short.
@@ -237,16 +237,16 @@ pub enum SdoFailure {
     /// Two devices answer with this node-ID.
     #[error("{}", two_devices(.0.as_ref()))]
     TwoDevices(Option<SecondAnswer>),
-    /// The same before the first write of the command.
+    /// Two devices answer with this node-ID, before the first write of the command.
     #[error("{}; nothing was written", two_devices(Some(.0)))]
     NotWritten(SecondAnswer),
-    /// Another master used the channel again and again.
+    /// Another master used the channel repeatedly.
     #[error("another master uses the node's SDO channel at the same time")]
     Disturbed,
-    /// The time for the transfer, or for all transfers together, is over.
+    /// The time limit of the transfer, or of all transfers, has passed.
     #[error("not finished within {}", format_duration(*.0))]
     Overtime(Duration),
-    /// The caller cancelled the transfer, or the node was silent to an earlier one.
+    /// The caller cancelled the transfer, or the node did not answer an earlier transfer.
     #[error("not finished")]
     Cancelled,
 }
@@ -268,8 +268,8 @@ fn two_devices(answers: Option<&SecondAnswer>) -> String {
 }
 
 /// Describes the frames that were received instead of an answer.
-fn received(clue: &Clue) -> String {
-    let heard = clue.frame.map(|frame| format!("; heard {frame}")).unwrap_or_default();
-    let state = clue.state.map(|state| format!("; its heartbeat says {state}")).unwrap_or_default();
+fn received(missed: &MissedAnswer) -> String {
+    let heard = missed.frame.map(|frame| format!("; heard {frame}")).unwrap_or_default();
+    let state = missed.state.map(|state| format!("; its heartbeat says {state}")).unwrap_or_default();
     format!("{heard}{state}")
 }

@@ -6,7 +6,7 @@ mod receive;
 
 use super::Timing;
 use super::active::Active;
-use super::clues::Clues;
+use super::missed_answer::MissedAnswers;
 use super::request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 use super::second_answer::{Answers, OnTwoDevices, SecondAnswer};
 use super::send::Outgoing;
@@ -19,7 +19,7 @@ use crate::canopen::sdo::{AbortCode, TransferError, proves_60};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-/// A request without an answer. The answer may still come.
+/// A request whose answer was not received in time. The answer may still come.
 #[derive(Clone, Copy, Debug)]
 struct StaleRequest {
     object: ObjectId,
@@ -38,7 +38,7 @@ struct Node {
     accept_60: bool,
 }
 
-/// How late an answer may come. CiA 301 gives no limit; storing takes the longest.
+/// The longest delay of an answer. CiA 301 gives no limit; storing takes the longest time.
 const STALE_LIFETIME: Duration = Duration::from_secs(10);
 
 /// The results of the transfers that have ended.
@@ -57,8 +57,8 @@ pub(super) struct SdoClient {
     /// Whether a node has a waiting transfer and none in progress.
     can_start: bool,
     on_two_devices: OnTwoDevices,
-    clues: Clues,
-    /// The length of the first heartbeat of each node that has not one byte.
+    missed_answers: MissedAnswers,
+    /// The length of the first heartbeat of each node whose length is not one byte.
     odd_heartbeats: BTreeMap<NodeId, usize>,
 }
 
@@ -96,9 +96,9 @@ impl SdoClient {
         self.can_start
     }
 
-    /// Whether frames with other COB-IDs than those of the nodes are wanted.
+    /// Whether frames with COB-IDs other than those of the nodes are needed.
     pub(super) fn wants_all_frames(&self) -> bool {
-        self.clues.wants_all_frames()
+        self.missed_answers.wants_all_frames()
     }
 
     pub(super) fn has_finished(&self) -> bool {
@@ -130,7 +130,7 @@ impl SdoClient {
             let Some((ticket, request)) = node.waiting.pop_front() else { continue };
             node.stale.retain(|request| request.until > now);
             // A server answers in order. If a stale answer for this object may come, another object is read first
-            // (barrier read). When that is answered, no older answer can come.
+            // (barrier read). After the answer to the barrier read, no older answer can come.
             let has_stale_request = node.stale.iter().any(|stale| stale.object == request.object);
             let mut active = if has_stale_request {
                 let other = node.barrier(request.object);
@@ -144,13 +144,13 @@ impl SdoClient {
         }
     }
 
-    /// The bus has taken a frame of a transfer. After the last queued frame the time for the answer starts.
+    /// The bus has accepted a frame of a transfer. The time-out starts after the last queued frame.
     pub(super) fn on_sent(&mut self, ticket: Ticket, now: Mono, timing: &Timing) {
         let active = self.nodes.get_mut(&ticket.node).and_then(|node| node.active.as_mut());
         if let Some(active) = active.filter(|active| active.ticket == ticket) {
             active.machine.on_sent();
             if active.asked_at.replace(active.asked_at.unwrap_or(now)).is_none() {
-                self.clues.on_request(ticket.node, active.request.object);
+                self.missed_answers.on_request(ticket.node, active.request.object);
             }
             active.unsent = active.unsent.saturating_sub(1);
             if active.unsent == 0 {
@@ -182,7 +182,7 @@ impl SdoClient {
         self.limit = limit;
     }
 
-    /// Ends all transfers whose common time is over.
+    /// Ends all transfers if their common time limit has passed.
     fn end_overtime(&mut self, now: Mono, outgoing: &mut Outgoing) {
         let Some((_, time)) = self.limit.filter(|&(until, _)| now >= until) else { return };
         for node in self.nodes.values_mut() {
@@ -206,16 +206,16 @@ impl SdoClient {
         let id = received.frame.id();
         let known = id.sdo_response_node().or_else(|| id.sdo_request_node());
         let Some(number) = known.filter(|node| self.nodes.contains_key(node)) else {
-            self.clues.on_other_cob_id(&received.frame, received.at.mono);
+            self.missed_answers.on_other_cob_id(&received.frame, received.at.mono);
             return false;
         };
         let Some(node) = self.nodes.get_mut(&number) else { return false };
         let is_stale = node.has_stale(&received.frame);
         let is_ours = node.on_frame(received, timing, outgoing, &mut self.finished);
         if is_ours {
-            self.clues.on_answer(number);
+            self.missed_answers.on_answer(number);
         } else if !is_stale {
-            self.clues.on_channel(number, &received.frame, received.at.mono);
+            self.missed_answers.on_channel(number, &received.frame, received.at.mono);
         }
         node.accept_60 |= is_ours && proves_60(&received.frame);
         self.due = earlier(self.due, node.active.as_ref().and_then(|active| active.deadline));
@@ -265,11 +265,12 @@ impl SdoClient {
                 node.stale.push(StaleRequest { object: active.request.object, until: now + STALE_LIFETIME });
                 node.answers.on_repeated(active.request.object);
                 let may_repeat = active.request.repeatable && timing.retries > 0;
-                let is_starting = may_repeat && self.clues.is_starting(active.request.node, active.asked_at, now);
+                let is_starting =
+                    may_repeat && self.missed_answers.is_starting(active.request.node, active.asked_at, now);
                 if active.attempts_left > 0 || is_starting {
                     active.is_repeated = true;
                     active.attempts_left = active.attempts_left.saturating_sub(1);
-                    self.clues.on_repeat(active.request.node);
+                    self.missed_answers.on_repeat(active.request.node);
                     out.push(active.machine.request());
                     active.enqueue(out, outgoing);
                     continue;
@@ -278,17 +279,17 @@ impl SdoClient {
             let Some(mut active) = node.active.take() else { continue };
             out.into_iter().for_each(|frame| outgoing.push(frame, None));
             if !has_begun && active.request.repeatable && active.request.falls_back() {
-                // Some servers do not answer an unknown request at all.
+                // Some servers do not answer unknown requests.
                 active.request.fall_back();
                 node.waiting.push_front((active.ticket, active.request));
                 continue;
             }
-            self.clues.add_wasted(active.overtime(now, timing));
-            let clue = self.clues.end(active.request.node);
+            self.missed_answers.add_time_without_answer(active.overtime(now, timing));
+            let missed = self.missed_answers.end(active.request.node);
             let failure = match active.request.operation() {
                 _ if is_over => SdoFailure::Overtime(active.time(timing)),
                 Operation::Read if active.foreign.is_served() => active.disturbance(),
-                _ => SdoFailure::NoAnswer { waited: active.timeout(timing), started: has_begun, clue },
+                _ => SdoFailure::NoAnswer { waited: active.timeout(timing), started: has_begun, missed },
             };
             self.finished.push_back((active.ticket, Err(active.error_of_sent(failure))));
         }
@@ -300,7 +301,7 @@ impl SdoClient {
         node.waiting.retain(|(waiting, _)| *waiting != ticket);
         if let Some(active) = node.active.take_if(|active| active.ticket == ticket) {
             node.answers.on_repeated(active.request.object);
-            self.clues.end(ticket.node);
+            self.missed_answers.end(ticket.node);
         }
         self.can_start |= node.active.is_none() && !node.waiting.is_empty();
     }
@@ -351,7 +352,7 @@ impl SdoClient {
             node.waiting.clear();
         }
         self.finished.clear();
-        self.clues.cancel();
+        self.missed_answers.cancel();
         (self.due, self.can_start) = (None, false);
     }
 }
@@ -369,7 +370,7 @@ impl Node {
         [ObjectId::DEVICE_TYPE, ERROR_REGISTER, IDENTITY].into_iter().find(is_fresh).unwrap_or(fallback)
     }
 
-    /// Why transfers with this node are refused; `None` if they are not.
+    /// Why transfers with this node are rejected; `None` if they are allowed.
     fn refusal(&self, reaction: OnTwoDevices) -> Option<SdoFailure> {
         let answers = self.answers.differing()?;
         match reaction {

@@ -1,7 +1,7 @@
 //! Detects a second answer to one request: two devices with one node-ID, or a bridge that repeats frames.
 //!
-//! A server answers each request once. Requests of another master and repeated requests cause further answers as well,
-//! so no conclusion is drawn from these.
+//! A server answers each request once. Requests of another master and repeated requests also cause further answers, so
+//! such answers are ignored.
 
 use super::request::Operation;
 use crate::bus::Mono;
@@ -10,24 +10,24 @@ use crate::canopen::object::ObjectId;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
-/// How long answers may belong to a request of another master.
+/// The time in which answers may belong to a request of another master.
 const FOREIGN_ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The longest wait for a second answer.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
-/// The number of earlier answers that are recognised if they arrive once more.
+/// The number of earlier answers whose repetition is recognised.
 const HISTORY: usize = 16;
 
 /// The reaction if two devices answer with one node-ID.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnTwoDevices {
-    /// Transfers with it fail.
+    /// Transfers with the node-ID fail.
     #[default]
     Fail,
-    /// The same for commands that write: the failure states that nothing was written.
+    /// Transfers with the node-ID fail, and the failure reports that nothing was written. For commands that write.
     RefuseWrites,
-    /// Transfers continue, and the object with two answers is unknown: for scans, which report it.
+    /// Transfers continue; the value of the object with two answers is unknown. For scans, which report the conflict.
     Report,
 }
 
@@ -36,7 +36,7 @@ pub enum OnTwoDevices {
 pub struct SecondAnswer {
     /// The answer that was used.
     pub first: Frame,
-    /// The other one.
+    /// The other answer.
     pub second: Frame,
 }
 
@@ -59,7 +59,7 @@ pub(super) struct Answers {
     initial: Option<(Frame, Operation)>,
     /// The latest frame that was used.
     latest: Option<Frame>,
-    /// The values of `initial`, the latest one last.
+    /// Earlier values of `initial`, the latest one last.
     history: VecDeque<(Frame, Operation)>,
     /// Objects whose request was repeated or dropped. More than one answer may come.
     repeated: BTreeSet<ObjectId>,
@@ -67,14 +67,14 @@ pub(super) struct Answers {
     finding: Option<SecondAnswer>,
     /// When a second answer to the latest request would have arrived.
     wait_until: Option<Mono>,
-    /// Whether the time for a second answer has passed once without one.
+    /// Whether the time for a second answer has once passed without such an answer.
     is_single: bool,
     /// Whether [`Answers::needs_check`] was called.
     is_checked: bool,
 }
 
 impl Answers {
-    /// The differing answers, else the repeated one.
+    /// The two different answers; if there are none, the repeated answer.
     pub(super) fn finding(&self) -> Option<SecondAnswer> {
         self.finding
     }
@@ -83,8 +83,8 @@ impl Answers {
         self.finding.filter(|finding| finding.differs())
     }
 
-    /// Whether the node must be asked for its serial number before the first write: nothing is known of it, or its
-    /// answers arrive twice. `true` only once.
+    /// Whether the serial number must be read before the first write: the node has not answered yet, or its answers
+    /// arrive twice. `true` only once.
     pub(super) fn needs_check(&mut self) -> bool {
         let is_first = !std::mem::replace(&mut self.is_checked, true);
         is_first && (self.latest.is_none() || self.finding.is_some())
@@ -115,8 +115,8 @@ impl Answers {
         self.wait_until = Some(at + wait);
     }
 
-    /// Whether this frame repeats the latest one and answers nothing: a segment whose successor is expected, or an
-    /// answer to the previous request, which was of another kind. An abort has the same form for both kinds.
+    /// Whether this frame only repeats the latest one. It is then a segment whose successor is expected, or an answer
+    /// to the previous request of the other kind (read or write). An abort has the same form for both kinds.
     pub(super) fn is_repetition(&self, frame: &Frame, operation: Operation, is_in_segments: bool, at: Mono) -> bool {
         let is_abort = frame.data().first() == Some(&0x80);
         let is_other = !is_abort && self.initial.is_some_and(|(_, previous)| previous != operation);
@@ -127,7 +127,7 @@ impl Answers {
         self.foreign_until.is_some_and(|until| at < until)
     }
 
-    /// A frame that answers nothing. Whether it is a second answer.
+    /// Handles a frame that does not answer a request. Returns whether it is a second answer.
     pub(super) fn on_unexpected(&mut self, frame: &Frame, at: Mono) -> bool {
         let object = multiplexer(frame);
         if self.may_be_foreign(at) || object.is_some_and(|object| self.repeated.contains(&object)) {
@@ -144,7 +144,7 @@ impl Answers {
         else {
             return false;
         };
-        // An answer that arrived before may be a late one to an earlier request.
+        // The earlier answer may be a late answer to a previous request.
         if self.count(&first) == 1 && self.differing().is_none() {
             self.finding = Some(SecondAnswer { first, second: *frame });
         }
@@ -156,7 +156,7 @@ impl Answers {
         self.history.iter().filter(|(answer, _)| answer == frame).count()
     }
 
-    /// Until when a second answer may arrive; `None` if the node is known to be single.
+    /// Until when a second answer may arrive; `None` if only one device has this node-ID.
     pub(super) fn wait_until(&self) -> Option<Mono> {
         self.wait_until.filter(|_| !self.is_single || self.finding.is_some())
     }
@@ -177,7 +177,7 @@ fn multiplexer(frame: &Frame) -> Option<ObjectId> {
     }
 }
 
-/// Whether a frame has the form of an answer to the request that `initial` answers.
+/// Whether a frame could answer the same request as `initial`.
 fn answers(frame: &Frame, operation: Operation, initial: &Frame) -> bool {
     let command = |frame: &Frame| frame.data().first().copied().unwrap_or_default();
     // A server may abort a segmented transfer that it began.
@@ -238,7 +238,7 @@ mod tests {
             assert!(log.on_unexpected(&frame(late), ms(21)));
         }
         assert!(log.finding().is_some() && log.differing().is_none());
-        // The first answer to the second request may be the late one to the first request.
+        // The first answer to the second request may be the late answer to the first request.
         let mut log = after(&[(SERIAL, Operation::Read), (SERIAL, Operation::Read)]);
         assert!(log.on_unexpected(&frame(OTHER_SERIAL), ms(21)));
         assert_eq!(log.differing(), None);
@@ -256,7 +256,7 @@ mod tests {
     #[test]
     fn other_answers_prove_nothing() {
         let mut log = after(&[(SERIAL, Operation::Read)]);
-        // Another object, an acknowledge of an earlier write, a segment.
+        // Another object, the acknowledgement of an earlier write, or a segment.
         for other in ["585#4318100134120000", "585#6018100400000000", "585#0018100400000000", "585#"] {
             assert!(!log.on_unexpected(&frame(other), ms(11)), "{other}");
         }

@@ -1,4 +1,4 @@
-//! The queue of frames to send. It is paced to the bit rate and copes with a full transmit queue.
+//! The queue of frames to send. Sending is paced to the bit rate. A full transmit queue is retried.
 
 use super::Ticket;
 use crate::bus::{Bus, BusError, Mono};
@@ -7,7 +7,7 @@ use crate::canopen::wire_length::{bit_time, frame_time};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// The wait before a full transmit queue is tried again. Linux does not report when it has room.
+/// The wait before a full transmit queue is tried again. Linux does not report when the queue has space again.
 const QUEUE_RETRY_INTERVAL: Duration = Duration::from_millis(1);
 
 /// How many frames may wait in the interface. The default transmit queue of a Linux interface holds 10.
@@ -19,16 +19,16 @@ const LONGEST_FRAME_BITS: u32 = 135;
 /// The queue between the protocol machines and the bus.
 pub(super) struct Outgoing {
     queue: VecDeque<(Frame, Option<Ticket>)>,
-    /// The bit rate in bit/s, read at the first need: on some buses that takes time.
+    /// The bit rate in bit/s, read when first needed, because this takes time on some buses.
     bit_rate: Option<Option<u32>>,
     /// When the bus has carried all frames sent so far, if no other node sends.
     wire_free_at: Mono,
     full_since: Option<Mono>,
-    /// A frame that cannot be sent is dropped without an error.
+    /// Whether a frame that cannot be sent is dropped without an error.
     tolerates_outages: bool,
-    /// The frame that was queued before all others, while it waits.
+    /// The frame that was queued before all others, until it is sent.
     first: Option<Frame>,
-    /// When the bus took it.
+    /// When the bus accepted this frame.
     first_at: Option<Mono>,
 }
 
@@ -54,7 +54,7 @@ impl Outgoing {
         self.queue.push_back((frame, ticket));
     }
 
-    /// Queues a frame before all others; `false` if the same frame is already there.
+    /// Queues a frame before all others; `false` if such a frame already waits.
     pub(super) fn push_first(&mut self, frame: Frame) -> bool {
         let is_new = self.queue.front() != Some(&(frame, None));
         if is_new {
@@ -69,7 +69,7 @@ impl Outgoing {
         *self = Outgoing { tolerates_outages: self.tolerates_outages, ..Outgoing::new() };
     }
 
-    /// When the bus took the frame that was last queued before all others, returned once. `None` if it still waits
+    /// When the bus accepted the frame that was last queued before all others, returned once. `None` if it still waits
     /// or was dropped.
     pub(super) fn take_first_at(&mut self) -> Option<Mono> {
         self.first_at.take()
@@ -138,7 +138,7 @@ impl Outgoing {
                     if !self.tolerates_outages {
                         return Err(BusError::QueueFull);
                     }
-                    // No node acknowledges. The waiting frames would be too late when one does again.
+                    // No node acknowledges. When a node acknowledges again, the waiting frames would be too late.
                     self.first = None;
                     self.queue.drain(..).filter_map(|(_, ticket)| ticket).for_each(|ticket| sent(ticket, now));
                     self.full_since = None;
@@ -154,7 +154,8 @@ impl Outgoing {
             if let Some(ticket) = ticket {
                 sent(*ticket, now);
             }
-            // The time of this frame, not of the longest one: a long burst would otherwise be slower than the bus.
+            // Uses the length of this frame, not that of the longest frame: otherwise a long burst would be slower than
+            // the bus.
             if let Some(bit_rate) = bit_rate {
                 self.wire_free_at = self.wire_free_at.max(now) + frame_time(frame, bit_rate);
             }

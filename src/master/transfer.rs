@@ -9,9 +9,8 @@
 //! | block upload | `5 + s`, plus 1 for every 127 segments | 3, plus 1 for every 127 segments |
 //!
 //! Block transfer needs fewer frames for more than 3 written segments or more than 4 read ones. With 28 bytes as the
-//! limit for both, it never needs more frames. A rejected block request costs two extra frames. Most sensors, and all
-//! four with a built-in description, do not support block transfer. So it is used only if it saves frames: see
-//! [`BlockMode::Auto`].
+//! limit for both, it never needs more frames. A rejected block request costs two extra frames. Most sensors do not
+//! support block transfer. So it is used only if it saves frames: see [`BlockMode::Auto`].
 
 use super::request::NUMBER_LIMIT;
 use super::{Answer, Error, Happening, Master, Operation, Request, SdoError, Ticket};
@@ -36,8 +35,8 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BlockMode {
     /// If it saves frames: writes of more than [`SMALL`] bytes, reads of type DOMAIN, and reads of at least [`LARGE`]
-    /// bytes. For DOMAIN, the server may answer segmented up to [`SMALL`] bytes. If the device rejects the block
-    /// request or does not answer it, the transfer is segmented.
+    /// bytes. For DOMAIN objects of up to [`SMALL`] bytes, the server may answer segmented. If the device rejects or
+    /// ignores the block request, the transfer is segmented.
     ///
     /// Strings and unknown types are first read segmented, because most are short and some servers react badly to an
     /// unknown request.
@@ -60,7 +59,7 @@ pub enum Blocks {
     WhenLarge,
     /// In blocks; segmented if the device does not support it.
     First {
-        /// For an upload: up to this size in bytes the server may answer segmented.
+        /// For an upload: up to this size in bytes, the server may answer segmented.
         threshold: u8,
     },
     /// Only in blocks.
@@ -172,7 +171,7 @@ impl Master<'_> {
     ) -> Result<Result<Answer, SdoError>, Error> {
         let (node, object, operation) = (request.node, request.object, request.operation());
         let ticket = self.start(request);
-        // From the latest known moment: a short transfer needs no reading of the clock.
+        // Uses the latest known moment, so that a short transfer does not read the clock.
         let mut report_at = self.seen + REPORT_INTERVAL;
         let mut timed = false;
         loop {

@@ -38,8 +38,8 @@ impl Wanted {
 }
 
 impl Layout<'_> {
-    /// The signal or object that a requested value means on this node. A name that is no signal may be the name of an
-    /// object.
+    /// The signal or object that a requested value means on this node. A name that is not a signal may be the name of
+    /// an object.
     pub fn resolve(&self, item: &Wanted) -> Wanted {
         let Wanted::Signal(name) = item else { return item.clone() };
         if self.signals.iter().any(|signal| signal.name == *name) {
@@ -49,7 +49,7 @@ impl Layout<'_> {
             return Wanted::Named(name.clone(), object);
         }
         let Some(object) = self.object(name) else { return item.clone() };
-        let named = |signal: &&Signal| !signal.has_channel() && signal.value.0 == object;
+        let named = |signal: &&Signal| !signal.has_channel() && signal.value_object.0 == object;
         match self.signals.iter().find(named) {
             Some(signal) => Wanted::Signal(signal.name.clone()),
             None => Wanted::Named(self.name_of(object), object),
@@ -72,17 +72,17 @@ struct TpdoDecoder {
     /// Length of the mapping in bytes.
     length: usize,
     values: Vec<MappedValue>,
-    /// Makes no samples at present.
+    /// Whether TPDOs are ignored at present.
     is_paused: bool,
     /// TPDOs received with another length.
     wrong_lengths: u64,
     /// The length of the first TPDO with another length.
     other_length: Option<usize>,
-    /// A TPDO with the length of the mapping was received.
+    /// Whether a TPDO with the length of the mapping was received.
     has_mapped_length: bool,
-    /// TPDOs had more than one length.
+    /// Whether TPDOs had more than one length.
     has_mixed_lengths: bool,
-    /// TPDOs of [`TpdoDecoder::other_length`] are used up to the mapped length.
+    /// Whether TPDOs of [`TpdoDecoder::other_length`] are used up to the mapped length.
     uses_longer: bool,
 }
 
@@ -104,13 +104,13 @@ pub struct LengthsSeen(BTreeMap<CanId, (usize, bool)>);
 /// The result of decoding a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decoded {
-    /// It is not a known TPDO.
+    /// The frame is not a known TPDO.
     OtherFrame,
-    /// It is a TPDO of this node, and its samples were added.
+    /// A TPDO of this node. Its samples were added.
     Tpdo(NodeId),
-    /// It is a TPDO of this node that makes no samples at present.
+    /// A TPDO of this node that is ignored at present.
     Paused(NodeId),
-    /// It is a TPDO of this node with another length than its mapping. It made no samples.
+    /// A TPDO of this node whose length differs from its mapping. It was ignored.
     WrongLength(NodeId),
 }
 
@@ -129,7 +129,7 @@ impl Decoder {
         for tpdo in layout.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()) {
             let mut decoder = self.tpdo_decoder(layout, tpdo, wanted);
             let id = tpdo.cob_id.can_id();
-            // Two nodes send with one COB-ID: the sender of a frame is unknown.
+            // Two nodes send with the same COB-ID, so the sender of a frame is unknown.
             if let Some(other) = self.tpdos.remove(&id).filter(|other| other.node != layout.node) {
                 decoder.is_paused = true;
                 decoder.values.extend(other.values);
@@ -145,9 +145,9 @@ impl Decoder {
         self.add(layout, wanted);
     }
 
-    /// Uses the TPDOs of a node that are always longer than their mapping, up to the mapped length. Call it only if the
-    /// mapping was read from the device and read again without a difference. `before` has the lengths received before the
-    /// mapping was read again. Returns the mapped and the received length of each such TPDO.
+    /// Uses the TPDOs of a node that are always longer than their mapping, up to the mapped length. Call this only if
+    /// the mapping was read twice from the device without a difference. `before` has the lengths received before the
+    /// second read. Returns the mapped and the received length of each such TPDO.
     pub fn use_longer(&mut self, node: NodeId, before: &LengthsSeen) -> Vec<(CanId, usize, usize)> {
         let mut used = Vec::new();
         for (&id, tpdo) in self.tpdos.iter_mut().filter(|(_, tpdo)| tpdo.node == node) {
@@ -180,12 +180,12 @@ impl Decoder {
         self.tpdos.retain(|_, tpdo| tpdo.node != node);
     }
 
-    /// A node reports an overload of a channel; `None` if the emergency names no channel.
+    /// A node reports an overload of a channel; `None` if the emergency contains no channel.
     pub fn begin_overload(&mut self, node: NodeId, channel: Option<u8>) {
         self.overloads.insert((node, channel));
     }
 
-    /// Sets or ends the overload of a node, as its error register shows it.
+    /// Sets or ends the overload of a node, from its error register.
     pub fn set_overload(&mut self, node: NodeId, has_overload: bool) {
         self.end_overload(node);
         if has_overload {
@@ -204,7 +204,7 @@ impl Decoder {
         of_node.for_each(|(_, channel)| reading.report_overload(sample, *channel));
     }
 
-    /// The setup of a node may have changed: its TPDOs make no samples until [`Decoder::replace`].
+    /// The setup of a node may have changed: its TPDOs are ignored until [`Decoder::replace`].
     pub fn pause(&mut self, node: NodeId) {
         self.tpdos.values_mut().filter(|tpdo| tpdo.node == node).for_each(|tpdo| tpdo.is_paused = true);
     }
@@ -274,7 +274,7 @@ impl Decoder {
         &self.sources
     }
 
-    /// COB-IDs with which two nodes send TPDOs, each returned once. These TPDOs make no samples.
+    /// COB-IDs with which two nodes send TPDOs, each returned once. These TPDOs are ignored.
     pub fn take_shared_cob_ids(&mut self) -> BTreeMap<CanId, (NodeId, NodeId)> {
         std::mem::take(&mut self.shared)
     }
@@ -294,14 +294,14 @@ impl Decoder {
         self.tpdos.get(&id).is_some_and(|tpdo| tpdo.values.iter().any(|value| value.reading.source == source))
     }
 
-    /// TPDOs of a node that had another length than their mapping.
+    /// The number of TPDOs of a node whose length differed from their mapping.
     pub fn wrong_lengths(&self, node: NodeId) -> u64 {
         self.tpdos.values().filter(|tpdo| tpdo.node == node).map(|tpdo| tpdo.wrong_lengths).sum()
     }
 
     /// Decodes a frame. Its samples are added to `samples` in the order of the mapping.
     ///
-    /// A TPDO with another length than its mapping makes no samples: its mapping was changed, or another device sent it.
+    /// A TPDO whose length differs from its mapping is ignored: its mapping was changed, or another device sent it.
     pub fn decode(&mut self, received: &Received, samples: &mut Vec<Sample>) -> Decoded {
         let frame = &received.frame;
         let Some(tpdo) = self.tpdos.get_mut(&frame.id()).filter(|_| !frame.is_remote()) else {
@@ -350,7 +350,7 @@ pub fn source(node: NodeId, name: &str, unit: Option<Unit>) -> Source {
     Source { node, signal: Arc::from(name), unit: Arc::from(unit_text(unit)) }
 }
 
-/// A unit in words; empty if it is unknown.
+/// The symbol of a unit; empty if it is unknown.
 fn unit_text(unit: Option<Unit>) -> String {
     unit.map(|unit| unit.to_string()).unwrap_or_default()
 }

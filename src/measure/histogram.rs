@@ -1,17 +1,17 @@
 //! The distribution of times, in memory that does not grow with their number.
 //!
-//! Times are counted in buckets. Up to 8.192 us a bucket is one nanosecond wide, above it less than 0.025 % of the time.
-//! A quantile is the middle of its bucket, so its error is at most 0.0125 %. The shortest and the longest time are exact.
-//! Buckets are allocated in pages when they are first needed: similar times need few pages. A bucket counts up to four
+//! Times are counted in buckets. Up to 8.192 us, a bucket is one nanosecond wide; above, less than 0.025 % of the time.
+//! A quantile is the middle of its bucket, so its error is at most 0.0125 %. The shortest and the longest time are
+//! exact. Buckets are allocated in pages at first use, so similar times need few pages. A bucket counts up to four
 //! billion.
 
 use std::time::Duration;
 
-/// A power of two is divided into 2 to this power buckets.
+/// Each power of two is divided into 2^12 buckets.
 const FINE_BITS: u32 = 12;
 /// Buckets in a page.
 const PAGE: usize = 64;
-/// The longest time with a bucket of its own: 39 hours. Longer times are counted in the same bucket.
+/// The upper limit for buckets: 39 hours. All longer times are in one bucket.
 const LONGEST: u64 = (1 << 47) - 1;
 
 /// Counts of times.
@@ -53,14 +53,15 @@ impl Histogram {
         self.longest
     }
 
-    /// The time that `share` (0 to 1) of all times do not exceed. The error is at most 0.0125 %.
+    /// The time that a `share` (0 to 1) of all times does not exceed. The error is at most 0.0125 %.
     pub fn quantile(&self, share: f64) -> Option<Duration> {
         self.place(share, self.buckets())
     }
 
-    /// The distance from `centre` that `share` (0 to 1) of all times do not exceed. The error is at most 0.0125 % of the time.
+    /// The distance from `centre` that a `share` (0 to 1) of all times does not exceed. The error is at most 0.0125 %
+    /// of the time.
     pub fn distance(&self, centre: Duration, share: f64) -> Option<Duration> {
-        // The middle of a bucket may be beyond its last time.
+        // The middle of a bucket may be after its last time.
         let farthest = self.farthest(centre)?;
         let centre = nanoseconds(centre);
         let mut distances: Vec<(u64, u64)> =

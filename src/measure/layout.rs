@@ -18,13 +18,13 @@ pub struct Signal {
     /// The CiA 404 channel, 1 to 199; any other number means none.
     pub channel: u8,
     /// The object that holds the process value, and its type; `None` if no source states the type.
-    pub value: (ObjectId, Option<DataType>),
+    pub value_object: (ObjectId, Option<DataType>),
     /// Other objects that hold the same process value.
-    pub also: Vec<ObjectId>,
+    pub other_objects: Vec<ObjectId>,
     /// The status object (6150h), if the node has one.
     pub status: Option<ObjectId>,
     /// Whether the smallest value of the type marks an overload.
-    pub marker: bool,
+    pub has_marker: bool,
     /// The physical unit (6131h); `None` if it is unknown.
     pub unit: Option<Unit>,
     /// The decimal digits (6132h); `None` if they are unknown.
@@ -43,18 +43,18 @@ pub enum Scaling {
     Digits,
     /// The number is the value.
     Plain,
-    /// By factor and offset.
+    /// The number is scaled by factor and offset.
     Fixed(Scale),
 }
 
 /// Scaling and status of a signal, if they are not those of CiA 404.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rules {
-    /// From the number to the value.
+    /// The scaling from the number to the value.
     pub scaling: Scaling,
     /// The bits of the status object.
     pub status_bits: StatusBits,
-    /// Numbers that take the place of the value.
+    /// Numbers that replace the value.
     pub markers: Markers,
 }
 
@@ -74,34 +74,34 @@ impl Rules {
 /// The measuring range of a signal, as far as it is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MeasuringRange {
-    /// Nothing.
+    /// The range is unknown.
     #[default]
     Unknown,
-    /// Its limits are unknown, and the manual warns that narrow integers may be clipped.
+    /// The limits are unknown, and the manual warns that narrow integers may be clipped.
     MayClip,
     /// The start and the end (6148h, 6149h), in the unit of the signal.
     Known(f64, f64),
 }
 
 impl Signal {
-    /// Whether the device reports no status: neither by a status object nor by a marker.
-    pub fn has_no_status(&self) -> bool {
-        self.status.is_none() && !self.marker
+    /// Whether the device reports a status, by a status object or by a marker.
+    pub fn has_status(&self) -> bool {
+        self.status.is_some() || self.has_marker
     }
 
     /// Whether `object` holds the process value of this signal.
     ///
-    /// True for the described objects, and for the four process value families of CiA 404 (6130h REAL32, 7130h
-    /// INTEGER16, 8130h INTEGER24, 9130h INTEGER32) with the channel as sub-index.
+    /// True for the described objects. Also true for 6130h (REAL32), 7130h (INTEGER16), 8130h (INTEGER24) and 9130h
+    /// (INTEGER32) with the channel as sub-index.
     pub fn is_value(&self, object: ObjectId) -> bool {
-        object == self.value.0
-            || self.also.contains(&object)
+        object == self.value_object.0
+            || self.other_objects.contains(&object)
             || self.has_channel()
                 && object.sub == self.channel
                 && PROCESS_VALUES.iter().any(|&(index, _)| index == object.index)
     }
 
-    /// Whether the signal is a channel of CiA 404, with the objects of one.
+    /// Whether the signal is a CiA 404 channel.
     pub fn has_channel(&self) -> bool {
         (1..=199).contains(&self.channel)
     }
@@ -115,8 +115,7 @@ pub const PROCESS_VALUES: [(u16, DataType); 4] = [
     (0x7130, DataType::Integer(2)),
 ];
 
-/// The parts of a signal that are objects of their own, besides its status: the name and the index without its first
-/// digit.
+/// Parts of a signal with their own object (`pressure.net`): the name, and the lower three digits of the index.
 pub const PARTS: [(&str, u16); 2] = [("field", 0x100), ("net", 0x140)];
 
 /// The parameters and the mapping of a TPDO.
@@ -139,7 +138,7 @@ pub struct Tpdo {
 pub struct Layout<'a> {
     /// The node-ID.
     pub node: NodeId,
-    /// The device profile, the low word of 1000h; `None` if it is unknown.
+    /// The device profile, the family_offset word of 1000h; `None` if it is unknown.
     pub profile: Option<u32>,
     /// The device description, if the node was recognised or the user named one.
     pub model: Option<&'a Model>,
@@ -166,7 +165,7 @@ impl Layout<'_> {
     /// The type that the description states for the value of a signal outside of CiA 404.
     fn type_of_signal(&self, object: ObjectId) -> Option<DataType> {
         let mut own = self.signals.iter().filter(|signal| !signal.has_channel());
-        own.find(|signal| signal.value.0 == object)?.value.1
+        own.find(|signal| signal.value_object.0 == object)?.value_object.1
     }
 
     /// The name of an object in the description, the EDS, the profile or the standard; else its address.
@@ -177,7 +176,7 @@ impl Layout<'_> {
         described.or_else(of_profile).or_else(standard).unwrap_or_else(|| object.to_string())
     }
 
-    /// The object with this name, as [`Layout::name_of`] or as an EDS spells it. Letter case is ignored.
+    /// The object with this name, in the form of [`Layout::name_of`] or of an EDS. Letter case is ignored.
     pub fn object(&self, name: &str) -> Option<ObjectId> {
         let described = self.model.and_then(|model| model.dictionary.find(name)).map(|entry| entry.object);
         let of_profile = |name: &str| profiles::find(self.profile?, name);
@@ -186,13 +185,13 @@ impl Layout<'_> {
         described.or_else(|| known(name)).or_else(|| spellings(name).iter().find_map(|name| known(name)))
     }
 
-    /// An object of a signal in one of the families of CiA 404: `low` is the index without its first digit. It is in the
-    /// family of the process value if the device has it there.
-    pub fn find_in_family(&self, signal: &Signal, low: u16) -> Option<ObjectId> {
-        let own = signal.value.0.index & 0xf000;
+    /// Finds an object of a signal; `family_offset` is the index without its first digit. The family of the process
+    /// value (6xxxh to 9xxxh) is searched first.
+    pub fn find_in_family(&self, signal: &Signal, family_offset: u16) -> Option<ObjectId> {
+        let own = signal.value_object.0.index & 0xf000;
         let families =
             [own, 0x6000, 0x9000, 0x8000, 0x7000].into_iter().filter(|family| (0x6000..=0x9000).contains(family));
-        let mut objects = families.map(|family| ObjectId::new(family | low, signal.channel));
+        let mut objects = families.map(|family| ObjectId::new(family | family_offset, signal.channel));
         let known = self.model.map(|model| &model.dictionary).filter(|dictionary| !dictionary.is_empty());
         objects.find(|object| signal.has_channel() && known.is_none_or(|known| known.get(*object).is_some()))
     }
@@ -200,8 +199,8 @@ impl Layout<'_> {
     /// The object of a part of a signal: `pressure.field` (x100h), `pressure.net` (x140h).
     pub fn part(&self, name: &str) -> Option<ObjectId> {
         let (signal, part) = name.rsplit_once('.')?;
-        let (_, low) = PARTS.into_iter().find(|(known, _)| *known == part)?;
-        self.find_in_family(self.signals.iter().find(|known| known.name == signal)?, low)
+        let (_, family_offset) = PARTS.into_iter().find(|(known, _)| *known == part)?;
+        self.find_in_family(self.signals.iter().find(|known| known.name == signal)?, family_offset)
     }
 
     /// The unit of an object: that of its channel, else the fixed one of the description.
@@ -216,7 +215,7 @@ impl Layout<'_> {
         self.data_type(object).filter(|data_type| fits(*data_type, bits))
     }
 
-    /// The signal whose unit and decimal digits an object has: a process value of CiA 404 in the channel of the signal.
+    /// The signal of a CiA 404 process value. The object has the unit and decimal digits of this signal.
     pub fn signal_of(&self, object: ObjectId) -> Option<&Signal> {
         let is_process_value = profiles::meaning(object) == Some(profiles::Meaning::Process);
         let is_404 = self.profile == Some(profiles::MEASURING) && is_process_value;
@@ -224,12 +223,12 @@ impl Layout<'_> {
     }
 }
 
-/// A signal that is sent as an integer which is too narrow for its measuring range.
+/// A signal that is sent as an integer too narrow for its measuring range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NarrowValue {
     /// The signal.
     pub signal: String,
-    /// The object that carries it.
+    /// The object that contains the signal.
     pub object: ObjectId,
     /// The largest value of its type, in the unit of the signal.
     pub largest: f64,
@@ -253,7 +252,7 @@ impl Layout<'_> {
 }
 
 impl Signal {
-    /// Whether an object of this type is too narrow for the measuring range of the signal.
+    /// Returns the details if this type is too narrow for the measuring range.
     pub fn narrow_value(&self, object: ObjectId, data_type: DataType) -> Option<NarrowValue> {
         let DataType::Integer(width @ 1..=3) = data_type else { return None };
         let digits = self.digits.unwrap_or(0).min(9);

@@ -1,6 +1,6 @@
 //! Decodes TPDOs and SDO answers to samples with unit and status.
 //!
-//! Nothing here reads a clock: every sample has the stamp of the frame it came with.
+//! This layer does not read a clock: every sample has the time stamp of its frame.
 
 pub mod decode;
 pub mod expression;

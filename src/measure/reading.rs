@@ -1,4 +1,4 @@
-//! From the bytes of one value to a sample: type, decimal digits, status, and the cases in which there is no value.
+//! Converts the bytes of one value to a sample: type, decimal digits, status, and missing values.
 
 use super::layout::{Layout, MeasuringRange, Rules, Scaling as Rule, Signal};
 use super::sample::{Doubt, Number, Raw, Sample, Status};
@@ -16,7 +16,7 @@ pub struct Reading {
     channel: Option<u8>,
     data_type: Option<DataType>,
     scaling: Scaling,
-    marker: bool,
+    has_marker: bool,
     has_status: bool,
     range: MeasuringRange,
     rules: Rules,
@@ -25,25 +25,25 @@ pub struct Reading {
 /// Whether a number has decimal digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scaling {
-    /// It is as it was sent.
+    /// The number is used as sent.
     Plain,
-    /// It is a measured value; its decimal digits (6132h) are known or not.
+    /// The number is a measured value with these decimal digits (6132h); `None` if they are unknown.
     Digits(Option<u8>),
-    /// It has a factor and an offset.
+    /// The number has a factor and an offset.
     Fixed(Scale),
 }
 
 /// More decimal digits are impossible: CiA 404 has 0 to 9.
 const MAX_DIGITS: u8 = 9;
 
-/// A REAL32 nearer to zero than this is no measured value: INTEGER32 up to 2.3e8 look like this.
+/// A REAL32 nearer to zero than this is not a measured value: it is probably an INTEGER32 up to 2.3e8.
 const SMALLEST_REAL: f32 = 1e-30;
 
-/// An overload starts this share of the measuring range beyond its ends (CiA 404 devices: 3.125 %).
+/// An overload starts outside the measuring range by this share of the range (CiA 404 devices: 3.125 %).
 const OVERLOAD_MARGIN: f64 = 0.03125;
 
 impl Reading {
-    /// For the process value of a signal. `source` is the number of the source.
+    /// The reading of the process value of a signal. `source` is the number of the source.
     pub fn of_signal(signal: &Signal, data_type: Option<DataType>, source: usize) -> Reading {
         Reading {
             source,
@@ -55,21 +55,21 @@ impl Reading {
                 Rule::Fixed(scale) => Scaling::Fixed(scale),
             },
             rules: signal.rules.clone(),
-            marker: signal.marker,
+            has_marker: signal.has_marker,
             has_status: signal.status.is_some(),
             range: signal.range,
         }
     }
 
-    /// For an object by its address: as it was sent. Other process values of a channel than the measured one (net
-    /// value, limits) have the decimal digits of the channel.
+    /// The reading of an object by its address, as sent. Other process values of a channel (net value, limits) have the
+    /// decimal digits of the channel.
     pub fn of_object(layout: Layout<'_>, object: ObjectId, data_type: Option<DataType>, source: usize) -> Reading {
         let signal = layout.signal_of(object).filter(|signal| !signal.is_value(object));
         let scaling = signal.map_or(Scaling::Plain, |signal| Scaling::Digits(signal.digits));
         Reading { scaling, ..Reading::plain(data_type, source) }
     }
 
-    /// For a number without unit and decimal digits.
+    /// The reading of a number without unit and decimal digits.
     pub fn plain(data_type: Option<DataType>, source: usize) -> Reading {
         let range = MeasuringRange::Unknown;
         let rules = Rules::default();
@@ -78,7 +78,7 @@ impl Reading {
             channel: None,
             data_type,
             scaling: Scaling::Plain,
-            marker: false,
+            has_marker: false,
             has_status: true,
             range,
             rules,
@@ -90,7 +90,7 @@ impl Reading {
         self.data_type
     }
 
-    /// From the number in the bytes to the value; `None` if the type or the decimal digits are unknown.
+    /// The scale from the number to the value; `None` if the type or the decimal digits are unknown.
     pub fn scale(&self) -> Option<Scale> {
         let plain = Scale { factor: Decimal::ONE, offset: Decimal::ZERO };
         let data_type = self.data_type.filter(|data_type| data_type.is_number())?;
@@ -131,12 +131,12 @@ impl Reading {
         let status_bits = status_bits.map(|bits| self.rules.status_bits.to_cia_404(bits));
         let marker = if let Value::Integer(_) | Value::Unsigned(_) = value { self.marker_bits(&value) } else { None };
         let reported = marker.or(status_bits).map(Status::from_bits);
-        let marked = !number.is_finite() || self.marker && is_smallest(&value, data_type);
+        let marked = !number.is_finite() || self.has_marker && is_smallest(&value, data_type);
         let mut status = match reported {
             Some((Status::Ok, _)) if marked => Some(Status::Invalid),
             Some((status, _)) => Some(status),
             None if marked => Some(Status::Invalid),
-            None if self.marker => Some(Status::Ok),
+            None if self.has_marker => Some(Status::Ok),
             None => None,
         };
         let mut valid = !marked && reported.is_none_or(|(_, valid)| valid);
@@ -158,7 +158,7 @@ impl Reading {
         Some(Sample { value: valid.then_some(number), ..without_value(status, doubt) })
     }
 
-    /// The status that an integer marks by itself, as bits of 6150h.
+    /// The status that an integer shows by a marker, as bits of 6150h.
     fn marker_bits(&self, value: &Value) -> Option<u64> {
         let number = match value {
             Value::Integer(number) => *number,
@@ -167,16 +167,16 @@ impl Reading {
         self.rules.markers.status_bits(number)
     }
 
-    /// Gives the sample the status of an overload that the device reports for a channel (`None`: for all) by an
-    /// emergency or its error register. A signal with a status of its own keeps that.
+    /// Sets the status of a sample from an overload that the device reports by an emergency or its error register.
+    /// `channel: None` means all channels. A signal with its own status keeps it.
     pub fn report_overload(&self, sample: &mut Sample, channel: Option<u8>) {
         let is_meant = self.channel.is_some_and(|own| channel.is_none_or(|channel| channel == own));
-        if let Some(value) = sample.value.filter(|_| is_meant && !self.has_status && !self.marker) {
+        if let Some(value) = sample.value.filter(|_| is_meant && !self.has_status && !self.has_marker) {
             sample.status = Some(sample.status.unwrap_or(self.range.nearer_end(value.as_f64())));
         }
     }
 
-    /// Whether the measuring range goes beyond a value at the end of its type.
+    /// Whether the measuring range extends beyond a value at the end of its type.
     fn range_goes_beyond(&self, value: f64) -> bool {
         match self.range {
             MeasuringRange::Known(start, end) if value > 0.0 => start.max(end) > value,
@@ -201,7 +201,7 @@ impl MeasuringRange {
         }
     }
 
-    /// The overload of a value that the device reports as one: at the nearer end of the range, else by its sign.
+    /// The direction of an overload that the device reports: the nearer end of the range, else the sign of the value.
     fn nearer_end(self, value: f64) -> Status {
         let middle = if let MeasuringRange::Known(start, end) = self { f64::midpoint(start, end) } else { 0.0 };
         if value < middle { Status::OverloadLow } else { Status::OverloadHigh }
@@ -239,10 +239,10 @@ mod tests {
         Signal {
             name: "pressure".into(),
             channel: 1,
-            value: (ObjectId::new(0x6130, 1), Some(DataType::Real32)),
-            also: Vec::new(),
+            value_object: (ObjectId::new(0x6130, 1), Some(DataType::Real32)),
+            other_objects: Vec::new(),
             status: None,
-            marker: false,
+            has_marker: false,
             unit: None,
             digits,
             rules: Rules::default(),
@@ -317,7 +317,7 @@ mod tests {
             assert_eq!(sample(&signal(Some(digits), UNKNOWN), I32, &[1, 0, 0, 0], Some(0)), (String::new(), "invalid"));
         }
         assert_eq!(sample(&signal(None, UNKNOWN), I32, &[57, 48, 0, 0], Some(0)), ("12345".into(), ""));
-        // INTEGER32 behind REAL32: 12345, 12345678.
+        // INTEGER32 values read as REAL32: 12345, 12345678.
         for bytes in [[57, 48, 0, 0], [0x4e, 0x61, 0xbc, 0]] {
             let found = sample(&signal(Some(3), UNKNOWN), DataType::Real32, &bytes, Some(0));
             assert_eq!(found, (String::new(), "invalid"));
@@ -351,6 +351,6 @@ mod tests {
         assert_eq!(status(&signal(Some(3), UNKNOWN), -1, None), "overload-low");
         let with_status = Signal { status: Some(ObjectId::new(0x6150, 1)), ..dps.clone() };
         assert_eq!(status(&with_status, 1_000, None), "");
-        assert_eq!(status(&Signal { marker: true, ..dps }, 1_000, None), "ok");
+        assert_eq!(status(&Signal { has_marker: true, ..dps }, 1_000, None), "ok");
     }
 }

@@ -53,7 +53,7 @@ impl Number {
         }
     }
 
-    /// The nearest REAL64, the same as parsing the text.
+    /// The nearest REAL64, equal to the parsed text.
     pub fn as_f64(self) -> f64 {
         match self {
             // Up to 2^53 and 22 digits both numbers are exact, so their quotient is the nearest one. Otherwise the text
@@ -78,8 +78,7 @@ impl Number {
 }
 
 impl fmt::Display for Number {
-    /// Integers with the device's digits (`50.000`), REAL32 as the shortest text that reads back to the
-    /// same number.
+    /// Integers with the device's digits (`50.000`), REAL32 as the shortest text that parses to the same number.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Number::Decimal { mantissa, digits: 0 } => write!(f, "{mantissa}"),
@@ -106,7 +105,7 @@ pub enum Status {
     OverloadHigh,
     /// Below the measuring range.
     OverloadLow,
-    /// The value is at the end of its integer type, and the measuring range goes further.
+    /// The value is at the end of its integer type, and the measuring range is larger.
     Clipped,
 }
 
@@ -207,9 +206,9 @@ pub enum Doubt {
     ImpossibleDigits(u8),
     /// The decimal digits (6132h) are unknown. The value is the integer.
     UnknownDigits,
-    /// The bytes are a REAL32 next to zero, as an integer would look. There is no value.
+    /// The bytes are a REAL32 close to zero, and are probably an integer. There is no value.
     LooksLikeInteger,
-    /// The value is at the end of its integer type, and the measuring range is unknown. The value stays.
+    /// The value is at the end of its integer type, and the measuring range is unknown. The value is kept.
     EndOfType,
 }
 
@@ -241,7 +240,7 @@ mod tests {
         assert_eq!(Status::from_bits(1), (Status::Invalid, false));
         assert_eq!(Status::from_bits(3), (Status::OverloadHigh, false));
         assert_eq!(Status::from_bits(5), (Status::OverloadLow, false));
-        // Outside the range, but marked as valid: the value stays.
+        // Outside the range, but marked as valid: the value is kept.
         assert_eq!(Status::from_bits(2), (Status::OverloadHigh, true));
         assert_eq!(Status::from_bits(6), (Status::Invalid, false));
         assert_eq!(Status::from_bits(7), (Status::Invalid, false));

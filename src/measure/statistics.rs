@@ -1,12 +1,12 @@
 //! Statistics in one pass (Welford), numerically stable for any number of samples.
 //!
-//! Welford's sums lose precision with each sample, because the terms become smaller than the last bit of the sum. The lost
-//! part is kept in a second number (Neumaier), so a billion samples give the same precision as a thousand.
+//! Welford's sums lose precision with each sample, because the terms become smaller than the last bit of the sum. A
+//! second number keeps the lost part (Neumaier), so a billion samples have the same precision as a thousand.
 
 use super::histogram::Histogram;
 use std::time::Duration;
 
-/// A sum with the part that its last bit cannot hold.
+/// A sum, and the part that is below its last bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sum {
     sum: f64,
@@ -41,16 +41,16 @@ pub struct Statistics {
     gaps: u64,
 }
 
-/// How far the intervals between samples are from their median. All times are exact to 0.025 % of the interval.
+/// The distances of the intervals between samples from their median. All times are exact to 0.025 % of the interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Jitter {
     /// The median interval.
     pub median: Duration,
-    /// Half of the intervals are within this distance from it.
+    /// Half of the intervals are within this distance from the median.
     pub p50: Duration,
-    /// 99 % of the intervals are within this distance from it.
+    /// 99 % of the intervals are within this distance from the median.
     pub p99: Duration,
-    /// The greatest distance from it.
+    /// The greatest distance from the median.
     pub max: Duration,
 }
 
@@ -133,7 +133,7 @@ impl Statistics {
         &self.intervals
     }
 
-    /// How far the intervals are from their median; `None` for fewer than two of them.
+    /// The distances of the intervals from their median; `None` for fewer than two intervals.
     pub fn jitter(&self) -> Option<Jitter> {
         if self.intervals.count() < 2 {
             return None;
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn mean_and_deviation_of_a_far_off_signal() {
-        // A naive sum of squares loses everything here.
+        // A naive sum of squares has no correct digit here.
         let mut statistics = Statistics::default();
         for (at, value) in [1e9 + 4.0, 1e9 + 7.0, 1e9 + 13.0, 1e9 + 16.0].into_iter().enumerate() {
             statistics.add(Some(value), Duration::from_millis(10 * at as u64));
@@ -191,7 +191,7 @@ mod tests {
         let mean = 0.2 * after / (before + after);
         let found = statistics.mean().expect("a mean") - 1e6;
         assert!((found - mean).abs() < mean * 1e-6, "{found:e}, {mean:e}");
-        // Of the squares: those around 0.2 among themselves, and the distance of both groups.
+        // The squares within the group around 0.2, and those of the distance between both groups.
         let squares = 0.01 * after + 0.04 * before * after / (before + after);
         let deviation = (squares / (before + after - 1.0)).sqrt();
         let found = statistics.deviation().expect("a deviation");

@@ -6,7 +6,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value, ValueError};
 use crate::master::{Error as MasterError, SdoError};
 
-/// Why something was not done with a node.
+/// Why an operation on a node failed.
 #[derive(Debug)]
 pub enum Error {
     /// The bus fails.
@@ -17,9 +17,9 @@ pub enum Error {
     ///
     /// If it was a write, the object is known to be unchanged.
     Sdo(SdoError),
-    /// A write was sent and not acknowledged, and nothing proves whether the node carried it out.
+    /// A write was sent but not acknowledged, and it is unknown whether the node executed the write.
     Unknown(SdoError),
-    /// An object was written, and reads differently.
+    /// An object was written, but has a different value when read back.
     NotKept {
         /// The node.
         node: NodeId,
@@ -30,8 +30,8 @@ pub enum Error {
         /// The value that was read back.
         found: Value,
     },
-    /// The value is narrower than the object, and the node accepts only writes without a size: the node would fill up
-    /// the missing bytes.
+    /// The value is narrower than the object, and the node accepts only writes without a size. The node would then fill
+    /// up the missing bytes.
     Width {
         /// The node.
         node: NodeId,
@@ -108,7 +108,7 @@ impl From<MasterError> for Error {
     }
 }
 
-/// A value as its type shows it; the bytes if they do not fit the type.
+/// The value of this type; the bytes if they do not fit the type.
 pub(super) fn shown(data: &[u8], data_type: DataType) -> Value {
     data_type.decode(data).unwrap_or_else(|_| Value::Bytes(data.to_vec()))
 }

@@ -9,7 +9,7 @@ use crate::device::unit::Unit;
 use crate::measure::layout::{Layout, Signal, Tpdo};
 use std::sync::Arc;
 
-/// The identity that a node reports. A field is `None` if the node refused to answer or was not asked.
+/// The identity that a node reports. A field is `None` if the node rejected the read or if the object was not read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
     /// The device type (1000h).
@@ -58,7 +58,7 @@ pub struct Node {
     pub identity: Identity,
     /// The device description, if the node was recognised or the user named one.
     pub model: Option<Arc<Model>>,
-    /// Whether `model` was looked for: `None` then means an unknown device.
+    /// Whether the description was searched for: `model: None` then means an unknown device.
     pub is_identified: bool,
     /// The signals.
     pub signals: Vec<Signal>,
@@ -94,7 +94,7 @@ impl Node {
         }
     }
 
-    /// A node of which only the node-ID is known, with the description that the user named for it.
+    /// A node of which only the node-ID and the description named by the user are known.
     pub fn with_overrides(id: NodeId, overrides: &Overrides) -> Node {
         let model = overrides.get(&id).cloned();
         Node { is_identified: model.is_some(), model, ..Node::new(id) }
@@ -105,7 +105,7 @@ impl Node {
         self.model.as_ref()?.description.object(object)?.unit.as_deref().and_then(Unit::from_symbol)
     }
 
-    /// The part that decoding needs.
+    /// The facts for decoding.
     pub fn layout(&self) -> Layout<'_> {
         Layout {
             node: self.id,

@@ -5,9 +5,9 @@
 //! - [`mod@write`]: writes an object in the form that the node accepts, and returns how it was confirmed;
 //! - [`wait`]: receives frames until a deadline, with one policy for Ctrl-C, link down and the end of a recording;
 //! - [`state`]: NMT states, commands, reset and the restart;
-//! - [`scan`] and [`targets`]: the nodes on the bus, and those that `all` means;
+//! - [`scan`] and [`targets`]: the nodes on the bus, and the nodes that `all` selects;
 //! - [`overheard`]: the objects that other masters read and write;
-//! - [`mod@offline`]: a node as its description has it, without a bus;
+//! - [`mod@offline`]: a node from its description, without a bus;
 //! - [`names`]: the objects, types and signals behind names.
 //!
 //! Errors are types ([`Error`]); their texts are in `output`.

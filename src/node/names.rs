@@ -19,19 +19,19 @@ impl Node {
     /// 1001h.
     pub const ERROR_REGISTER: ObjectId = ObjectId::new(0x1001, 0);
 
-    /// The bits of the error register that mean an overload, if the node has a signal without a status of its own.
+    /// The bits of the error register that mean an overload, if the node has a signal without its own status.
     pub fn overload_register(&self) -> Option<u8> {
-        let needs_it = self.signals.iter().any(Signal::has_no_status) && self.may_have(Node::ERROR_REGISTER);
+        let needs_it = self.signals.iter().any(|signal| !signal.has_status()) && self.may_have(Node::ERROR_REGISTER);
         self.model.as_ref().filter(|_| needs_it)?.description.overload_register()
     }
 
-    /// The entry of an object, from the description or the standard. Asks the node nothing.
+    /// The entry of an object, from the description or the standard. Sends no request.
     pub fn entry(&self, object: ObjectId) -> Option<Entry> {
         let described = self.model.as_ref().and_then(|model| model.dictionary.get(object).cloned());
         described.or_else(|| standard::entry(object))
     }
 
-    /// The entry with this name, from the description or the standard. Asks the node nothing.
+    /// The entry with this name, from the description or the standard. Sends no request.
     pub fn entry_by_name(&self, name: &str) -> Option<Entry> {
         let described = self.model.as_ref().and_then(|model| model.dictionary.find(name).cloned());
         let spelled = || dictionary::spellings(name).iter().find_map(|name| standard::find(name));
@@ -79,9 +79,9 @@ impl Node {
         family.map_or(DataType::Unsigned(4), |&(_, data_type)| data_type)
     }
 
-    /// The object of a signal in the family of its process value: `low` is the index without its first digit.
+    /// The object of a signal in the family of its process value. `low` is the index without its first digit.
     pub fn in_family(&self, signal: &Signal, low: u16) -> ObjectId {
-        ObjectId::new(signal.value.0.index & 0xf000 | low, signal.channel)
+        ObjectId::new(signal.value_object.0.index & 0xf000 | low, signal.channel)
     }
 
     /// The object with this name that belongs to a signal: with its channel as sub-index, or without one on a device
@@ -93,12 +93,12 @@ impl Node {
         numbered.or_else(single).map(|entry| entry.object)
     }
 
-    /// A requested value as this node has it: a name that no signal has, and that an object has, means the object.
+    /// Resolves a requested value on this node: a name is an object if no signal but an object has it.
     pub fn wanted(&self, item: &Wanted) -> Wanted {
         self.layout().resolve(item)
     }
 
-    /// The names of the signals, and before them the objects with names like this one.
+    /// The names of objects with similar names, then those of the signals.
     pub fn names_like(&self, name: &str) -> Vec<String> {
         let objects = self.model.iter().flat_map(|model| model.dictionary.iter()).map(Entry::full_name);
         let mut names = nearest(name, objects);
@@ -108,7 +108,7 @@ impl Node {
         names
     }
 
-    /// Every requested value as this node has it: see [`Node::wanted`].
+    /// Resolves every requested value: see [`Node::wanted`].
     pub fn all_wanted(&self, items: &[Wanted]) -> Vec<Wanted> {
         items.iter().map(|item| self.wanted(item)).collect()
     }
@@ -118,8 +118,7 @@ impl Node {
         self.signals.iter().filter(|signal| signal.has_channel()).collect()
     }
 
-    /// The event timer in ms by which a TPDO is sent; `None` if it is 0, or if this transmission type of the device does
-    /// not use it.
+    /// The event timer of a TPDO in ms; `None` if it is 0, or if the transmission type does not use it on this device.
     pub fn event_timer(&self, transmission: Option<Transmission>, event_timer_ms: Option<u16>) -> Option<u16> {
         let uses = |code| self.model.as_ref().is_none_or(|model| model.description.pdo.uses_timer(code));
         let is_used = match transmission {
@@ -139,7 +138,7 @@ impl Node {
 /// The entry of an object. Reads the identity of the node if the object is not known without it.
 ///
 /// # Errors
-/// A node that does not answer; bus errors and Ctrl-C.
+/// The node does not answer; bus errors and Ctrl-C.
 pub fn entry(master: &mut Master<'_>, node: &mut Node, object: ObjectId) -> Result<Option<Entry>, Error> {
     if node.entry(object).is_none() {
         survey::identify_late(master, node)?;
@@ -150,7 +149,7 @@ pub fn entry(master: &mut Master<'_>, node: &mut Node, object: ObjectId) -> Resu
 /// The object with this name. Reads the identity of the node if the name is not known without it.
 ///
 /// # Errors
-/// [`Error::Name`] with similar names; a node that does not answer; bus errors and Ctrl-C.
+/// [`Error::Name`] with similar names; the node does not answer; bus errors and Ctrl-C.
 pub fn resolve(master: &mut Master<'_>, node: &mut Node, name: &str) -> Result<ObjectId, Error> {
     if let Some(entry) = node.entry_by_name(name) {
         return Ok(entry.object);
@@ -175,7 +174,7 @@ pub fn resolve(master: &mut Master<'_>, node: &mut Node, name: &str) -> Result<O
 /// if the node indicates its size.
 ///
 /// # Errors
-/// [`Error::TypeUnknown`]; a node that does not answer; bus errors and Ctrl-C.
+/// [`Error::TypeUnknown`]; the node does not answer; bus errors and Ctrl-C.
 pub fn type_for(master: &mut Master<'_>, node: &mut Node, object: ObjectId, text: &str) -> Result<DataType, Error> {
     entry(master, node, object)?;
     if let Some(data_type) = node.known_type(object) {
@@ -194,8 +193,8 @@ pub fn type_for(master: &mut Master<'_>, node: &mut Node, object: ObjectId, text
     }
 }
 
-/// A value as bytes of a type: a number or text, the signature of the object by its word, or a word for one of the
-/// numbers that its description explains (`Pt100`).
+/// Encodes a value. `text` is a number, text, the signature of the object (`save`), or a word that the description
+/// explains (`Pt100`).
 ///
 /// # Errors
 /// [`Error::Value`] if it does not fit.
@@ -204,8 +203,8 @@ pub fn encode(node: &Node, object: ObjectId, data_type: DataType, text: &str) ->
     encoded.or_else(|error| word(node, object, data_type, text).ok_or(Error::Value { node: node.id, object, error }))
 }
 
-/// The bytes for a word instead of a number: the signature of the object, one of the numbers that its description
-/// explains, or a sensor type of CiA 404 (6110h).
+/// The bytes for a word instead of a number: a signature, a word that the description explains, or a sensor type of CiA
+/// 404 (6110h).
 pub fn word(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> Option<Vec<u8>> {
     if !matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_)) {
         return None;

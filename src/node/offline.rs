@@ -1,4 +1,4 @@
-//! A node as its description has it, without a bus.
+//! A node from its description, without a bus.
 
 use super::Node;
 use super::signals::described;
@@ -8,7 +8,7 @@ use crate::device::catalog::Model;
 use crate::measure::layout::Tpdo;
 use std::sync::Arc;
 
-/// A node of which only the description is known: its signals and TPDOs as the description has them.
+/// A node of which only the description is known. Signals and TPDOs are those of the description.
 pub fn offline(id: NodeId, model: &Arc<Model>) -> Node {
     let mut node = Node { model: Some(Arc::clone(model)), is_identified: true, ..Node::new(id) };
     node.signals = model.description.signals.iter().map(|entry| described(&node, entry)).collect();

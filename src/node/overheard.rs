@@ -14,15 +14,15 @@ use std::sync::Arc;
 #[derive(Default)]
 pub struct Overheard {
     known: BTreeMap<(NodeId, ObjectId), Vec<u8>>,
-    /// Objects that the nodes refused to read.
+    /// Objects whose read was rejected by the node.
     refused: BTreeSet<(NodeId, ObjectId)>,
     uploads: BTreeMap<NodeId, (ObjectId, Upload)>,
     downloads: BTreeMap<NodeId, (ObjectId, Vec<u8>)>,
 }
 
 impl Overheard {
-    /// Takes a frame. Returns the node and the object if it has a new value, or if the node refused to read it for the
-    /// first time.
+    /// Handles a frame. Returns the node and the object if the object has a new value, or if the node rejected its read
+    /// for the first time.
     pub fn take(&mut self, frame: &Frame) -> Option<(NodeId, ObjectId)> {
         if let Some(node) = frame.id().sdo_request_node() {
             self.request(node, frame);
@@ -32,7 +32,7 @@ impl Overheard {
         self.response(node, frame).map(|object| (node, object))
     }
 
-    /// Forgets objects of a node: those for which `is_forgotten` is true.
+    /// Forgets the objects of a node for which `is_forgotten` is true.
     pub fn forget(&mut self, node: NodeId, is_forgotten: impl Fn(ObjectId) -> bool) {
         let stays = |(of, object): &(NodeId, ObjectId)| *of != node || !is_forgotten(*object);
         self.known.retain(|key, _| stays(key));
@@ -53,7 +53,7 @@ impl Overheard {
         self.bytes(node, object).map(first_four)
     }
 
-    /// Whether the node refused to read an object.
+    /// Whether the node rejected the read of an object.
     pub fn is_refused(&self, node: NodeId, object: ObjectId) -> bool {
         self.refused.contains(&(node, object))
     }
@@ -107,7 +107,7 @@ impl Overheard {
         {
             return self.learn(node, object, bytes);
         }
-        // The other master requests the segments. The requests of our state machine are not sent.
+        // The other master requests the segments, so the requests of our state machine are not sent.
         let (object, upload) = self.uploads.get_mut(&node)?;
         let object = *object;
         match upload.on_frame(frame, &mut Vec::new()) {
@@ -128,7 +128,7 @@ impl Overheard {
     }
 }
 
-/// The first four bytes as a number; missing ones are 0.
+/// The first four bytes as a number; missing bytes are 0.
 pub fn first_four(bytes: &[u8]) -> u32 {
     let mut wide = [0; 4];
     let len = bytes.len().min(4);

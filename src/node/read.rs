@@ -13,7 +13,7 @@ pub type Item = (NodeId, ObjectId, DataType);
 /// Reads many values, the nodes in parallel. One result for each item, in their order.
 ///
 /// # Errors
-/// Bus errors and Ctrl-C. A device's own failure is in its result.
+/// Bus errors and Ctrl-C. The failure of one device is in its result.
 pub fn read_values<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Result<Value, SdoError>>, A::Stop> {
     let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
     let answers = master.ask(&objects)?;
@@ -26,7 +26,7 @@ pub fn read_values<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Result<
 /// Like [`read_values`], with `None` if the device rejects the read or the bytes do not fit the type.
 ///
 /// # Errors
-/// Also time-outs and protocol violations: a node that stops answering is not read in part.
+/// Also time-outs and protocol violations, because partial results are not returned.
 pub(super) fn read_known<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
     read_values(master, items)?
         .into_iter()
@@ -40,13 +40,13 @@ pub(super) fn read_known<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<O
         .collect()
 }
 
-/// The answers, and why a node that does not answer at all failed.
+/// The answers, and the error of a node that does not answer at all.
 type OptionalAnswers = (Vec<Option<Answer>>, Option<SdoError>);
 
-/// Reads objects that a device may lack. `None` for each that it does not answer properly: one such object affects no
-/// other.
+/// Reads optional objects. An object without a valid answer is `None` and does not affect the others.
 ///
-/// After a silent sub-index, the other sub-indices of its object are not read. If a node is silent twice in a row, the rest of its objects is `None` as well, and the error is returned beside.
+/// After a silent sub-index, the other sub-indices of its object are not read. If a node is silent twice in a row, its
+/// remaining objects are `None`, and the error is returned, too.
 ///
 /// # Errors
 /// Failures of the bus, and Ctrl-C.
@@ -74,7 +74,7 @@ pub(super) fn ask_optional<A: Ask>(master: &mut A, objects: &[(NodeId, ObjectId)
             match result {
                 Ok(answer) => answers[at] = Some(answer),
                 Err(error) => match error.failure {
-                    // The others were not asked after a silent one.
+                    // These objects were not read, because an earlier one got no answer.
                     SdoFailure::Cancelled => rest.push(at),
                     SdoFailure::NoAnswer { started: false, .. }
                         if unanswered.insert((error.node, error.object.index))
@@ -85,7 +85,7 @@ pub(super) fn ask_optional<A: Ask>(master: &mut A, objects: &[(NodeId, ObjectId)
                     }
                     SdoFailure::Refused(_) | SdoFailure::Fit(_) | SdoFailure::TwoDevices(_) => {}
                     SdoFailure::NoAnswer { started: false, .. } => {}
-                    // A transfer that failed in the middle is tried once more.
+                    // A transfer that failed in the middle is repeated once.
                     _ if repeated.insert(at) => rest.push(at),
                     _ => {}
                 },
@@ -101,7 +101,7 @@ pub(super) fn ask_optional<A: Ask>(master: &mut A, objects: &[(NodeId, ObjectId)
 /// The values of `ask_optional`; `None` also if the bytes do not fit the type.
 ///
 /// # Errors
-/// A node that is silent twice in a row, and what stops everything.
+/// A node is silent twice in a row; failures of the bus, and Ctrl-C.
 pub fn read_optional<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
     let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
     let (answers, dead) = ask_optional(master, &objects)?;

@@ -28,7 +28,7 @@ pub struct Presence {
     pub answered: BTreeSet<NodeId>,
     /// Nodes that showed another sign of life, with their state if a heartbeat showed it.
     pub states: BTreeMap<NodeId, Option<NmtState>>,
-    /// Frames with the identifier of a TPDO of the predefined connection set, by the node that it belongs to there.
+    /// The COB-IDs of received TPDOs, by their node in the predefined connection set.
     pub tpdos: BTreeMap<NodeId, BTreeSet<CanId>>,
     /// The objects that other masters read and wrote, in a passive scan.
     pub overheard: Overheard,
@@ -57,7 +57,7 @@ impl Presence {
             }
             None if received.frame.is_remote() => {}
             None => {
-                // The late answer to a request that was given up.
+                // A late answer to a cancelled request.
                 self.answered.extend(received.frame.id().sdo_response_node());
                 if let Some(node) = tpdo_node(received.frame.id()) {
                     self.tpdos.entry(node).or_default().insert(received.frame.id());
@@ -88,11 +88,11 @@ fn tpdo_node(id: CanId) -> Option<NodeId> {
     }
 }
 
-/// Asks every node for its device type (1000h), all in parallel.
+/// Reads the device type (1000h) of every node, all in parallel.
 ///
-/// A heartbeat, a boot-up message or a late answer counts as well. Nodes without an answer are asked `rounds` times;
-/// `timeout` is the wait after the last request. Returns 200 ms after the last requests at the earliest if states are
-/// still unknown.
+/// A heartbeat, a boot-up message or a late answer counts as well. Nodes without an answer are asked
+/// `rounds` times; `timeout` is the wait after the last request. If states are unknown, waits at least 200 ms after the
+/// last requests.
 ///
 /// The caller sets the filters: with [`Master::listen_to`] no TPDOs are received.
 ///
@@ -106,7 +106,7 @@ pub fn find(master: &mut Master<'_>, nodes: &[NodeId], timeout: Duration, rounds
     let mut presence = Presence::default();
     let mut asked_at = master.now();
     let rounds = rounds.max(1);
-    // One more round for nodes that booted in the meantime and missed the request.
+    // One more round, for nodes that were booting and missed the request.
     for round in 0..=rounds {
         let is_missing =
             |node: &&NodeId| !presence.answered.contains(node) && (round < rounds || presence.booted.contains(node));
@@ -121,7 +121,7 @@ pub fn find(master: &mut Master<'_>, nodes: &[NodeId], timeout: Duration, rounds
     Ok(presence)
 }
 
-/// Asks nodes once, and waits for their answers: in the last round all of them, else until it is time to repeat.
+/// Asks nodes once, and waits for their answers: in the last round until the time-out, else until the next repetition.
 fn ask(
     master: &mut Master<'_>,
     nodes: &[NodeId],

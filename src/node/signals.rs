@@ -9,7 +9,7 @@ use crate::device::scale::{Decimal, Scale};
 use crate::device::unit::Unit;
 use crate::measure::layout::{MeasuringRange, Rules, Scaling, Signal};
 
-/// A signal of the description. Unit and digits are not read yet.
+/// A signal of the description, without unit and digits.
 pub(crate) fn described(node: &Node, entry: &SignalEntry) -> Signal {
     let scaling = entry.scale.map_or(Scaling::Digits, Scaling::Fixed);
     let mut rules = Rules { scaling, markers: entry.markers.clone(), ..Rules::default() };
@@ -19,10 +19,10 @@ pub(crate) fn described(node: &Node, entry: &SignalEntry) -> Signal {
     Signal {
         name: entry.name.clone(),
         channel: entry.channel,
-        value: (entry.value, entry.data_type.or(node.layout().data_type(entry.value))),
-        also: entry.also.clone(),
+        value_object: (entry.value, entry.data_type.or(node.layout().data_type(entry.value))),
+        other_objects: entry.also.clone(),
         status: entry.status,
-        marker: entry.marker,
+        has_marker: entry.marker,
         unit: entry.fixed_unit,
         digits: None,
         rules,
@@ -30,7 +30,7 @@ pub(crate) fn described(node: &Node, entry: &SignalEntry) -> Signal {
     }
 }
 
-/// A channel of CiA 404 on a device without a description. Unit and digits are not read yet.
+/// A channel of CiA 404 on a device without a description, without unit and digits.
 pub(crate) fn channel(node: &Node, value: ObjectId) -> Signal {
     let mut signal = plain(node, value);
     (signal.name, signal.channel) = (format!("ch{}", value.sub), value.sub);
@@ -38,16 +38,16 @@ pub(crate) fn channel(node: &Node, value: ObjectId) -> Signal {
     signal
 }
 
-/// A number that is the value: an object of a profile, or the contents of a TPDO.
+/// A signal without scaling: an object of a profile, or the contents of a TPDO.
 fn plain(node: &Node, object: ObjectId) -> Signal {
     let layout = node.layout();
     Signal {
         name: layout.name_of(object),
         channel: 0,
-        value: (object, layout.data_type(object)),
-        also: Vec::new(),
+        value_object: (object, layout.data_type(object)),
+        other_objects: Vec::new(),
         status: None,
-        marker: false,
+        has_marker: false,
         unit: layout.unit_of(object),
         digits: None,
         rules: Rules::plain(),
@@ -55,21 +55,21 @@ fn plain(node: &Node, object: ObjectId) -> Signal {
     }
 }
 
-/// The signals of a device without channels of CiA 404: `measured` objects of its profile, then everything else in its
-/// valid TPDOs.
+/// The signals of a device without channels of CiA 404: `measured` objects of its profile, then all other objects in
+/// its valid TPDOs.
 pub(crate) fn objects(node: &Node, measured: impl IntoIterator<Item = ObjectId>) -> Vec<Signal> {
     let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
     let mapped = valid.flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object).filter(|object| object.index >= 0x20);
     let mut signals: Vec<Signal> = Vec::new();
     for object in measured.into_iter().chain(mapped) {
-        if !signals.iter().any(|signal| signal.value.0 == object) {
+        if !signals.iter().any(|signal| signal.value_object.0 == object) {
             signals.push(plain(node, object));
         }
     }
     signals
 }
 
-/// Whether a device can have channels of CiA 404: the other profiles use their objects for something else.
+/// Whether a device can have channels of CiA 404: the other profiles use these objects for other purposes.
 pub(crate) fn can_have_channels(node: &Node) -> bool {
     !matches!(
         node.identity.profile(),
@@ -77,8 +77,8 @@ pub(crate) fn can_have_channels(node: &Node) -> bool {
     )
 }
 
-/// The measured values of the profile of a node, and the object that shows whether the device has each: the count of an
-/// array, else the value.
+/// The measured values of the profile of a node, and for each the object that shows whether the device has it: the
+/// count of an array, else the value.
 pub(crate) fn profile_values(node: &Node) -> impl Iterator<Item = (Measured, ObjectId)> + use<> {
     let measured = node.identity.profile().map_or(&[][..], profiles::measured);
     let shown = node.model.clone().filter(|model| !model.dictionary.is_empty());
@@ -86,7 +86,7 @@ pub(crate) fn profile_values(node: &Node) -> impl Iterator<Item = (Measured, Obj
     measured.iter().copied().filter(known).map(|row| (row, ObjectId::new(row.index, 0)))
 }
 
-/// The objects of a measured value: `number` is the answer of [`profile_values`]'s object.
+/// The objects of a measured value. `number` is the value of the object from [`profile_values`].
 pub(crate) fn values_of(row: Measured, number: Option<u64>) -> Vec<ObjectId> {
     let count = match (row.is_array, number) {
         (_, None) => return Vec::new(),
@@ -99,7 +99,7 @@ pub(crate) fn values_of(row: Measured, number: Option<u64>) -> Vec<ObjectId> {
 /// The object with the step of a signal of a profile.
 pub(crate) fn step(node: &Node, signal: &Signal) -> Option<Step> {
     let is_plain = !signal.has_channel() && signal.rules.scaling == Scaling::Plain;
-    profiles::step(node.identity.device_type?, signal.value.0).filter(|_| is_plain)
+    profiles::step(node.identity.device_type?, signal.value_object.0).filter(|_| is_plain)
 }
 
 /// Scales a signal by its step, if the device has one.
@@ -115,7 +115,7 @@ pub(crate) fn set_step(signal: &mut Signal, step: Step, number: Option<u64>) {
 /// The objects that unit and scaling of the signals depend on.
 pub(crate) fn scaling_objects(node: &Node) -> Vec<ObjectId> {
     let of_signal = |signal: &Signal| {
-        let step = node.identity.device_type.and_then(|device_type| profiles::step(device_type, signal.value.0));
+        let step = node.identity.device_type.and_then(|device_type| profiles::step(device_type, signal.value_object.0));
         let [unit, digits] = unit_and_digits(node, signal);
         [unit, digits, step.map(|step| step.object)]
     };
@@ -125,7 +125,7 @@ pub(crate) fn scaling_objects(node: &Node) -> Vec<ObjectId> {
 /// The objects with unit and digits of a signal. A description can name others than 6131h and 6132h of the channel.
 pub(crate) fn unit_and_digits(node: &Node, signal: &Signal) -> [Option<ObjectId>; 2] {
     let described = node.model.iter().flat_map(|model| &model.description.signals);
-    let entry = described.into_iter().find(|entry| entry.name == signal.name && entry.value == signal.value.0);
+    let entry = described.into_iter().find(|entry| entry.name == signal.name && entry.value == signal.value_object.0);
     let of_channel = |index: u16| signal.has_channel().then(|| ObjectId::new(index, signal.channel));
     let unit = entry.and_then(|entry| entry.unit).or_else(|| of_channel(0x6131).filter(|_| signal.unit.is_none()));
     let digits = entry.and_then(|entry| entry.digits).or_else(|| of_channel(0x6132));

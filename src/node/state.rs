@@ -25,7 +25,7 @@ const LIFE_TIME_FACTOR: ObjectId = ObjectId::new(0x100d, 0);
 /// How long to listen for the guarding requests of another master.
 const OTHER_GUARD_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// The longest wait for a boot-up message. No manual gives a time; a device may write its memory first.
+/// The longest wait for a boot-up message. No manual gives a time, and a device may write its memory before.
 pub const BOOT_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// The evidence for a state.
@@ -39,12 +39,12 @@ pub enum Proof {
     Guarding,
     /// An SDO request that is no longer answered.
     Sdo,
-    /// Nothing.
+    /// No evidence.
     None,
 }
 
 impl Proof {
-    /// The word of the contract.
+    /// The word in JSON and tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Proof::Heartbeat => "heartbeat",
@@ -61,9 +61,9 @@ impl Proof {
 pub struct StateReport {
     /// The node.
     pub node: NodeId,
-    /// Its state; `None` if it is unknown.
+    /// The state; `None` if it is unknown.
     pub state: Option<NmtState>,
-    /// The evidence for it.
+    /// The evidence for the state.
     pub by: Proof,
     /// Whether the node showed any sign of life.
     pub is_present: bool,
@@ -160,11 +160,11 @@ impl LifeWatch {
     }
 }
 
-/// Finds out from which sources the state of each node can be read. A node without an answer may be stopped: that is no
-/// error.
+/// Finds the sources from which the state of each node can be read. A missing answer is not an error, because the node
+/// may be stopped.
 fn sources(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, StateSources>, MasterError> {
     let mut found: BTreeMap<NodeId, StateSources> = BTreeMap::new();
-    // The heartbeat time first: a node that does not answer is not asked for the others.
+    // The heartbeat time is read first: if a node does not answer, its other objects are not read.
     let items: Vec<_> = nodes.iter().map(|&node| (node, HEARTBEAT_TIME, DataType::Unsigned(2))).collect();
     for (&node, value) in nodes.iter().zip(read_values(master, &items)?) {
         let mut sources = StateSources { answers_sdo: true, ..StateSources::default() };
@@ -334,7 +334,7 @@ fn after_change(
     let is_open = |node: &NodeId| !watch.lives.contains_key(node) && !guarded.contains_key(node);
     let silent: Vec<NodeId> = nodes.iter().copied().filter(is_open).collect();
     let requests = silent.iter().map(|&node| Request::read(node, HEARTBEAT_TIME)).collect();
-    // Heartbeats that come meanwhile count as well.
+    // Heartbeats that arrive in this time are used, too.
     let answers = master.transfer(requests, &mut |received| watch.on_frame(received))?;
     let has_no_answer = |answer: &Result<_, crate::master::SdoError>| {
         answer.as_ref().is_err_and(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }))

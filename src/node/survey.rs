@@ -27,18 +27,18 @@ const U8: DataType = DataType::Unsigned(1);
 const U16: DataType = DataType::Unsigned(2);
 const U32: DataType = DataType::Unsigned(4);
 
-/// How many TPDOs are read from a device without a description. JUMO's temperature probe sends TPDO5.
+/// How many TPDOs are read from a device without a description. The temperature probe of JUMO sends TPDO5.
 const UNDESCRIBED_TPDOS: u16 = 8;
 
 /// The descriptions that the user named, by node.
 pub type Overrides = BTreeMap<NodeId, Arc<Model>>;
 
-/// How much longer than a recording or a display the reading of the setup may take.
+/// The extra time that reading the setup may take, in addition to the duration of a recording or display.
 pub const SETUP_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Reads objects for a survey.
 pub trait Ask {
-    /// Why the survey cannot go on.
+    /// Why the survey cannot continue.
     type Stop: From<Error>;
 
     /// Reads objects, and returns one result for each, in the same order.
@@ -114,7 +114,7 @@ fn identities<A: Ask>(
     Ok(identities)
 }
 
-/// Reads vendor, product and revision (1018h:1 to 3) of nodes. A number that a node does not have is `None`.
+/// Reads vendor, product and revision (1018h:1 to 3) of nodes. A missing number is `None`.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.
@@ -130,7 +130,7 @@ pub fn revisions(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<N
 /// Reads everything of the nodes: identity, signals with unit and digits, TPDOs.
 ///
 /// # Errors
-/// A node does not answer, or the survey cannot go on.
+/// A node does not answer, or the survey cannot continue.
 pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
     let mut found = identify(master, nodes, overrides)?;
     read_services(master, &mut found)?;
@@ -142,13 +142,13 @@ pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overri
     Ok(found)
 }
 
-/// Reads identities and finds the descriptions that fit. The name (1008h) is read only for this purpose: not if the user
-/// named the description of this device.
+/// Reads identities and finds the descriptions that fit. The name (1008h) is read only if the user did not name the
+/// description of the device.
 ///
 /// # Errors
-/// A node does not answer, or the survey cannot go on.
+/// A node does not answer, or the survey cannot continue.
 pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
-    // Some devices can be read only with their quirks: those of the descriptions that the user named are set first.
+    // Some devices can be read only with their quirks. So the quirks of the named descriptions are set first.
     for (node, model) in overrides {
         master.set_quirks(*node, &model.description.quirks);
     }
@@ -171,7 +171,7 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
     for ((node, identity), traits) in found.iter_mut().zip(identities).zip(&traits) {
         let given = overrides.get(&node.id).cloned();
         node.model = match given {
-            // Names come from the EDS of another device, types and units from the description of this one.
+            // If the EDS is for another device, only its names are used. Types and units come from the description.
             Some(model) if model.description.signals.is_empty() && !identity.fits(&model) => {
                 let own = recognise(traits).map(|own| Arc::new(own.with_eds(&model)));
                 own.or(Some(model))
@@ -337,7 +337,7 @@ fn find_objects<A: Ask>(master: &mut A, nodes: &mut [Node], others: &[usize]) ->
     for &at in others {
         let own = rows.iter().zip(&values).filter(|((of, ..), _)| *of == at);
         let found = own.flat_map(|((_, row, _), value)| {
-            // A negative value is no count, and shows that the device has the object.
+            // A negative value is not a count, but shows that the device has the object.
             let number = value.as_ref().map(|value| value.as_u64().unwrap_or(0));
             signals::values_of(*row, number)
         });
@@ -373,7 +373,7 @@ fn read_units<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
             objects.map(|object| object.and_then(|object| self::number(values.get(&(at, object))?.as_ref())));
         let node = &mut nodes[at];
         let step = signals::step(node, &node.signals[number]).zip(Some(step));
-        let fixed = node.fixed_unit(node.signals[number].value.0);
+        let fixed = node.fixed_unit(node.signals[number].value_object.0);
         let signal = &mut node.signals[number];
         let read = unit.and_then(|code| u32::try_from(code).ok()).map(Unit);
         signal.unit = read.or(signal.unit).or(fixed);

@@ -1,8 +1,8 @@
-//! Which nodes `all` means.
+//! The nodes that `all` selects.
 //!
-//! They are the nodes that a scan finds, and those with another sign of life meanwhile: a heartbeat, a boot-up message, a
-//! TPDO, a late answer. A node that answers only in part belongs to them. It is for the command to succeed with each of
-//! them or to report it as failed: no node is left out without a message.
+//! These are the nodes that a scan finds, and those with another sign of life during the scan: a heartbeat, a boot-up
+//! message, a TPDO, a late answer. Nodes that answer only some requests are included. The command must succeed with
+//! each node or report its failure: no node is omitted silently.
 
 use super::read::{Item, read_values};
 use super::scan::{self, Presence};

@@ -3,10 +3,11 @@
 //! An expedited download either contains its size (23h, 27h, 2Bh, 2Fh) or not (22h). Some devices accept only one of the
 //! two forms:
 //! 1. The first request has the form of the device description, else it contains the size.
-//! 2. If the node rejects the command (0504 0001h), the same form is sent once more. The reason may be a transfer that
-//!    another master did not finish. A signature is not sent again, and nothing is sent again after foreign SDO traffic.
-//! 3. If the node then rejects the form (0504 0001h) or the length (0607 0010h), the other form is sent once. If that is
-//!    rejected as well, the first abort code is reported.
+//! 2. If the node rejects the command (0504 0001h), the same form is sent once more. The reason may be an unfinished
+//!    transfer of another master. A signature is never sent again, and no write is sent again after foreign SDO
+//!    traffic.
+//! 3. If the node then rejects the form (0504 0001h) or the length (0607 0010h), the other form is sent once. If this
+//!    form is also rejected, the first abort code is reported.
 //! 4. Before a value is sent without its size, the width of the object is checked. If the object is wider, the node
 //!    would add zero bytes: -5 as INTEGER16 would become 65531 in an INTEGER32.
 //! 5. A signature ("save", "load", "zero", "tara", a number with "set") starts an action. It is sent once and never repeated.
@@ -42,7 +43,7 @@ pub enum Repeat {
     /// signatures.
     #[default]
     Repeatable,
-    /// The object is read back after each request. It is written again only if it holds another value.
+    /// The object is read back after each request. It is written again only if it has a different value.
     Once,
 }
 
@@ -65,9 +66,9 @@ pub struct WriteOptions<'a> {
 /// How a write was confirmed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Written {
-    /// The node acknowledged it.
+    /// The node acknowledged the write.
     Acknowledged,
-    /// No answer came, but perhaps this frame; the object was read back and holds the value.
+    /// No answer came. The object was read back and has the value. The frame is one received instead of the answer.
     ReadBack(Option<Frame>),
 }
 
@@ -83,9 +84,10 @@ pub fn write(master: &mut Master<'_>, node: &Node, object: ObjectId, data: &[u8]
 /// Writes an object.
 ///
 /// # Errors
-/// [`Error::Sdo`] if the object is known to be unchanged, [`Error::Unknown`] if no answer came and nothing proves whether
-/// the node carried out the write, [`Error::Width`] if the value is narrower than the object and the node accepts no
-/// size; bus errors and Ctrl-C.
+/// - [`Error::Sdo`] if the object is known to be unchanged.
+/// - [`Error::Unknown`] if no answer came and it is unknown whether the node executed the write.
+/// - [`Error::Width`] if the value is narrower than the object and the node does not accept a size.
+/// - Bus errors and Ctrl-C.
 pub fn write_with(
     master: &mut Master<'_>,
     node: &Node,
@@ -138,7 +140,7 @@ pub fn write_with(
 /// Writes a value and reads it back.
 ///
 /// # Errors
-/// As [`write()`]; [`Error::NotKept`] if the object reads differently.
+/// As [`write()`]; [`Error::NotKept`] if the object has a different value.
 pub fn write_and_verify(
     master: &mut Master<'_>,
     node: &Node,
@@ -203,8 +205,9 @@ fn request(
     if options.repeat == Repeat::Once || is_signature(data) { request.once() } else { request }
 }
 
-/// Checks that the object is not wider than the value. The width comes from the description. If it is not described, the
-/// object is read, and a node that indicates sizes shows the width. A signature always has the width of its object.
+/// Checks that the object is not wider than the value. The width comes from the description. If the object is not
+/// described, it is read; the answer shows the width if the node indicates sizes. A signature always has the width of
+/// its object.
 fn check_width(
     master: &mut Master<'_>,
     node: &Node,
@@ -229,7 +232,7 @@ fn check_width(
     }
 }
 
-/// Whether the object holds the value. `None` for a signature, and for an object that cannot be read.
+/// Whether the object has the value. `None` for a signature, and for an object that cannot be read.
 fn read_back(
     master: &mut Master<'_>,
     node: &Node,
@@ -247,10 +250,10 @@ fn read_back(
     Ok(Some(may_be_equal && uploaded.bytes.get(..data.len()) == Some(data)))
 }
 
-/// What was received instead of the answer.
+/// The frame that was received instead of the answer.
 fn heard(error: &SdoError) -> Option<Frame> {
     match error.failure {
-        SdoFailure::NoAnswer { clue, .. } => clue.frame,
+        SdoFailure::NoAnswer { missed, .. } => missed.frame,
         _ => None,
     }
 }

@@ -1,6 +1,6 @@
 //! Live view of a check: one line per expression with the latest values.
 
-use super::progress::{RATE, bar, style};
+use super::progress::{REDRAWS_PER_SECOND, bar, style};
 use super::verdict::values;
 use crate::measure::expression::verdict::LiveResult;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget};
@@ -19,7 +19,8 @@ pub struct CheckProgress {
 impl CheckProgress {
     /// Live lines for a check of `duration`. Hidden unless `show`.
     pub fn new(show: bool, duration: Duration) -> CheckProgress {
-        let target = if show { ProgressDrawTarget::stderr_with_hz(RATE) } else { ProgressDrawTarget::hidden() };
+        let target =
+            if show { ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_SECOND) } else { ProgressDrawTarget::hidden() };
         let multi = MultiProgress::with_draw_target(target);
         let total = bar(&multi, u64::try_from(duration.as_millis()).unwrap_or(u64::MAX));
         CheckProgress { multi, lines: Vec::new(), total, duration }

@@ -72,7 +72,7 @@ fn object_name(object: ObjectId) -> String {
 
 fn signal_entry(draft: &Draft, signal: &Signal, names: &mut BTreeSet<String>) -> String {
     let has = |object: &ObjectId| draft.objects.iter().any(|found| found.object == *object);
-    let value = signal.value.0;
+    let value = signal.value_object.0;
     let fallback = object_name(value);
     let name = if signal.name == value.to_string() { fallback.clone() } else { signal.name.clone() };
     let mut lines = vec![
@@ -100,7 +100,7 @@ fn signal_entry(draft: &Draft, signal: &Signal, names: &mut BTreeSet<String>) ->
         lines.push(format!("# unit = {}  # {note}", quoted(&unit)));
         lines.push("# factor = 1.0  # fill in: value = number * factor + offset".to_owned());
     }
-    if signal.value.1.is_none() {
+    if signal.value_object.1.is_none() {
         return commented("the type of the value is unknown, see [[object]] below", &lines);
     }
     lines.join("\n")

@@ -9,7 +9,7 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 /// Redraws per second.
-pub(super) const RATE: u8 = 10;
+pub(super) const REDRAWS_PER_SECOND: u8 = 10;
 
 /// Live lines on stderr.
 #[derive(Debug)]
@@ -25,7 +25,8 @@ pub struct Progress {
 impl Progress {
     /// Live lines, hidden unless `show`.
     pub fn new(show: bool, duration: Option<Duration>, count: Option<u64>) -> Progress {
-        let target = if show { ProgressDrawTarget::stderr_with_hz(RATE) } else { ProgressDrawTarget::hidden() };
+        let target =
+            if show { ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_SECOND) } else { ProgressDrawTarget::hidden() };
         let multi = MultiProgress::with_draw_target(target);
         let total = match (count, duration) {
             (Some(count), _) => bar(&multi, count),
@@ -39,7 +40,7 @@ impl Progress {
         Progress { multi, nodes: BTreeMap::new(), total, duration, count, changed: false }
     }
 
-    /// For the console: it prints its lines between redraws.
+    /// Returns the [`MultiProgress`]: the console prints its lines between the redraws.
     pub fn multi(&self) -> MultiProgress {
         self.multi.clone()
     }
@@ -50,7 +51,7 @@ impl Progress {
     }
 
     /// Stores the latest values for the next redraw.
-    pub fn take(&mut self, samples: &[Sample], sources: &[Source]) {
+    pub fn update_values(&mut self, samples: &[Sample], sources: &[Source]) {
         if self.is_hidden() {
             return;
         }
@@ -113,28 +114,28 @@ impl Progress {
 
 /// The progress of one transfer, shown only if it takes long.
 #[derive(Debug)]
-pub struct Transfer {
+pub struct TransferProgress {
     bar: Option<ProgressBar>,
-    /// The number of calls of [`Transfer::moved`], which come ten times a second.
+    /// The number of calls of [`TransferProgress::show_bytes`], ten per second.
     calls: Cell<u32>,
 }
 
 /// The first call that shows the progress: after 0.3 s.
 const FIRST_SHOWN_CALL: u32 = 3;
 
-impl Transfer {
+impl TransferProgress {
     /// A transfer that starts now; hidden unless `show`.
-    pub fn new(show: bool) -> Transfer {
+    pub fn new(show: bool) -> TransferProgress {
         let bar = show.then(|| ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()));
-        Transfer { bar, calls: Cell::new(0) }
+        TransferProgress { bar, calls: Cell::new(0) }
     }
 
     /// Shows the number of bytes moved, and the total if it is known.
-    pub fn moved(&self, (done, total): (usize, Option<usize>)) {
+    pub fn show_bytes(&self, (done, total): (usize, Option<usize>)) {
         self.calls.set(self.calls.get().saturating_add(1));
         let Some(bar) = self.bar.as_ref().filter(|_| self.calls.get() >= FIRST_SHOWN_CALL) else { return };
         if bar.is_hidden() {
-            bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(RATE));
+            bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_SECOND));
             bar.set_style(style("[{bar:27}] {bytes} of {total_bytes}, {binary_bytes_per_sec}").progress_chars("=> "));
         }
         if let Some(total) = total {

@@ -29,7 +29,7 @@ pub use setup::{Layout, Setup};
 use sink::RowSink;
 use std::io;
 use std::time::Duration;
-pub use target::{FileChange, Target};
+pub use target::{FileChange, OutputTarget};
 use wide::Wide;
 
 /// Turns samples into rows, one per value or one per cycle, and writes them.

@@ -5,7 +5,7 @@ use super::notes;
 use super::report::{Cell, Column, Report};
 use super::table::{self, Align};
 use crate::canopen::object::ObjectId;
-use crate::tasks::settings::Quantity;
+use crate::tasks::settings::ValueWithUnit;
 use crate::tasks::settings::errors::{ErrorCounter, ErrorReport, Errors, PastError};
 use crate::tasks::settings::filter::{FilterOf, FilterReport};
 use crate::tasks::settings::limits::{Limit, Limits};
@@ -104,7 +104,7 @@ impl Report for UnitChange {
 }
 
 /// A quantity with its unit; `-` if it is unknown.
-fn shown(quantity: Option<Quantity>) -> String {
+fn shown(quantity: Option<ValueWithUnit>) -> String {
     quantity.map_or_else(|| "-".to_owned(), |quantity| quantity.to_string())
 }
 
@@ -157,7 +157,7 @@ impl Report for Limits {
             Cell::from(value.map(|(_, _, quantity)| quantity.number))
         });
         let unit = self.values.first().and_then(|(_, _, quantity)| quantity.unit);
-        let row = |(limit, _, quantity): &(Limit, ObjectId, Quantity)| {
+        let row = |(limit, _, quantity): &(Limit, ObjectId, ValueWithUnit)| {
             vec![limit.as_str().into(), quantity.number.into(), quantity.unit.into()]
         };
         let mut cells = vec![self.node.into(), self.signal.as_str().into()];
@@ -195,7 +195,7 @@ impl Report for MinMax {
     ];
 
     fn cells(&self) -> Vec<Cell> {
-        let number = |quantity: Option<Quantity>| Cell::from(quantity.map(|quantity| quantity.number));
+        let number = |quantity: Option<ValueWithUnit>| Cell::from(quantity.map(|quantity| quantity.number));
         let ends = |extremes: &Extremes| [number(extremes.lowest), number(extremes.highest)];
         let [min, max] = ends(&self.now);
         let before = self.before.as_ref().map(ends);

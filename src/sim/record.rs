@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn values_have_the_form_of_the_contract() {
+    fn values_are_json() {
         // DPS, table 19: 50 C3 00 00 is 50.000 psi.
         let integer = reading(Some(3), None, false);
         assert_eq!(text(&integer, &[0x50, 0xc3, 0, 0], false), "127,pressure,50.000,psi,,0x50C30000");

@@ -1,15 +1,19 @@
-//! Sets a measuring channel (CiA 404, 6125h) or its net value (6139h) to zero: measures, checks, writes the signature
-//! once, measures again.
+//! Sets a measuring channel (CiA 404, 6125h) or its net value (6139h) to zero. The sequence: measure, check, write the
+//! signature once, measure again.
 //!
-//! By default the limits are parts of the measuring range: 1 % for the reading, 5 % for the total offset, 0.5 % for the
-//! variation of the readings. A larger limit from the user applies to the total offset, too.
+//! Default limits in percent of the measuring range:
+//! - 1 % for the reading
+//! - 5 % for the total offset
+//! - 0.5 % for the variation of the readings
+//!
+//! A larger limit from the user applies to the total offset, too.
 
 mod channel;
 mod failure;
 mod safety;
 mod samples;
 
-pub use failure::{AutozeroEffect, AutozeroFact, AutozeroFailure, OffsetChange, Quantity, Undo};
+pub use failure::{AutozeroEffect, AutozeroFact, AutozeroFailure, OffsetChange, Proof, Quantity, Undo};
 
 pub use safety::{Limit, Objection};
 
@@ -28,21 +32,21 @@ use channel::{Channel, Offset};
 use safety::{Limits, Measured};
 use samples::Samples;
 
-/// What is set to zero.
+/// The value to set to zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
+pub enum ZeroTarget {
     /// The process value, by the offset.
     Autozero,
     /// The net value (x140h), by the tare zero (x138h).
     Tare,
 }
 
-impl Action {
+impl ZeroTarget {
     /// The name of the command.
     pub fn as_str(self) -> &'static str {
         match self {
-            Action::Autozero => "autozero",
-            Action::Tare => "tare",
+            ZeroTarget::Autozero => "autozero",
+            ZeroTarget::Tare => "tare",
         }
     }
 }
@@ -50,13 +54,13 @@ impl Action {
 /// The options of an autozero or a tare.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// What is set to zero. A tare has no limit.
-    pub action: Action,
+    /// The value to set to zero. A tare has no limit.
+    pub target: ZeroTarget,
     /// The channel; `None`: the only one.
     pub channel: Option<u8>,
     /// The largest reading that is accepted as zero.
     pub limit: Limit,
-    /// The number of readings before, and of those after.
+    /// The number of readings before the signature, and again after it.
     pub samples: u32,
     /// Whether the safety checks are skipped.
     pub force: bool,
@@ -85,7 +89,7 @@ pub struct Zeroed {
     pub offset: Option<Number>,
     /// Whether it was stored.
     pub stored: bool,
-    /// The significant decimals.
+    /// The number of decimal digits to show.
     pub decimals: usize,
     /// Notes: skipped checks, how to undo it, whether it is stored.
     pub notes: Vec<Note>,
@@ -101,7 +105,7 @@ impl Zeroed {
 
 /// An autozero in progress.
 struct Procedure<'a> {
-    action: Action,
+    target: ZeroTarget,
     device: &'a Node,
     channel: Channel,
     limits: Option<Limits>,
@@ -114,8 +118,9 @@ struct Procedure<'a> {
 /// Sets the tare zero of a channel to 0, so that the net value is the process value again.
 ///
 /// # Errors
-/// The device has no tare, or its tare zero cannot be written; it rejects a request or does not answer; bus errors and
-/// Ctrl-C.
+/// - The device has no tare, or its tare zero cannot be written.
+/// - The device rejects a request or does not answer.
+/// - Bus errors and Ctrl-C.
 pub fn undo_tare(
     master: &mut Master<'_>,
     node: NodeId,
@@ -136,23 +141,27 @@ pub fn undo_tare(
     let after = samples::take(master, &device, &procedure.channel.signal.name, options.samples)?;
     let offsets = channel::offsets(master, &device, &procedure.channel)?;
     let undo = Note::of_node(node, AutozeroFact::Undo(procedure.undo(&offsets, false)));
-    let notes = procedure.moved(&offsets).map(|_| undo).into_iter().collect();
-    Ok(procedure.report(Some(&Written { offsets, after, is_offset_proof: None }), notes))
+    let notes = procedure.changed_offset(&offsets).map(|_| undo).into_iter().collect();
+    Ok(procedure.report(Some(&AfterWrite { offsets, after, proof: None }), notes))
 }
 
-/// What the device showed after the signature.
-struct Written {
+/// The readings and offsets after the signature was written.
+struct AfterWrite {
     offsets: Vec<Offset>,
     after: Samples,
-    /// If no acknowledge came: whether the offset, else the reading, proves that the device acted.
-    is_offset_proof: Option<bool>,
+    /// What proves that the device executed the signature, if it did not acknowledge it.
+    proof: Option<Proof>,
 }
 
 /// Sets a channel to zero if the safety checks allow it. With `store`, the group with the offset is stored.
 ///
 /// # Errors
-/// A safety check (nothing was changed); the device rejects a request or does not answer; a reading that is not zero
-/// afterwards; bus errors and Ctrl-C. The effects say what was changed before.
+/// - A safety check failed, and nothing was changed.
+/// - The device rejects a request or does not answer.
+/// - The reading is not zero afterwards.
+/// - Bus errors and Ctrl-C.
+///
+/// The effects list the changes made before the failure.
 pub fn autozero(
     master: &mut Master<'_>,
     node: NodeId,
@@ -166,9 +175,9 @@ pub fn autozero(
     let device = survey_nodes(master, &[node], overrides).map_err(|error| unchanged(error.into()))?;
     let mut device = device.into_iter().next().unwrap_or_else(|| Node::new(node));
     check_confirmed(Some(node), device.model.as_deref())?;
-    let channel = match options.action {
-        Action::Autozero => channel::find(master, &device, options.channel),
-        Action::Tare => channel::tare(master, &mut device, options.channel),
+    let channel = match options.target {
+        ZeroTarget::Autozero => channel::find(master, &device, options.channel),
+        ZeroTarget::Tare => channel::tare(master, &mut device, options.channel),
     };
     let procedure = Procedure::prepare(master, &device, channel.map_err(unchanged)?, options).map_err(unchanged)?;
     let mut notes = procedure.check(options)?;
@@ -181,17 +190,17 @@ pub fn autozero(
         false => None,
     };
     let written = procedure.write(master, options.samples)?;
-    procedure.prove(&written)?;
-    let proved_by = |offset| Note::of_node(node, AutozeroFact::ProvedBy { offset });
-    notes.extend(written.is_offset_proof.map(proved_by));
+    procedure.check_is_zero(&written)?;
+    let proved_by = |proof| Note::of_node(node, AutozeroFact::ProvedBy(proof));
+    notes.extend(written.proof.map(proved_by));
     let mut report = procedure.report(Some(&written), notes);
     report.notes.push(Note::of_node(node, AutozeroFact::Undo(procedure.undo(&written.offsets, options.store))));
-    procedure.keep(master, plan, &written, &mut report)?;
+    procedure.store(master, plan, &written, &mut report)?;
     Ok(report)
 }
 
 impl<'a> Procedure<'a> {
-    /// Reads what the checks need.
+    /// Reads the values for the safety checks.
     fn prepare(
         master: &mut Master<'_>,
         device: &'a Node,
@@ -208,10 +217,10 @@ impl<'a> Procedure<'a> {
         let group = group(master, device, &channel, options.store)?;
         let before = samples::take(master, device, &channel.signal.name, options.samples)?;
         let decimals = decimals(channel.range, channel.signal.digits);
-        Ok(Procedure { action: options.action, device, channel, limits, decimals, offsets, before, group })
+        Ok(Procedure { target: options.target, device, channel, limits, decimals, offsets, before, group })
     }
 
-    /// Runs the safety checks: a failure, or notes with `force`.
+    /// Runs the safety checks. With `force`, a failed check is a note.
     fn check(&self, options: &Options) -> Result<Vec<Note>, Failure> {
         let (node, channel) = (self.device.id, &self.channel);
         if self.before.booted {
@@ -226,13 +235,13 @@ impl<'a> Procedure<'a> {
             offset: self.offsets.first().map(|offset| offset.number.as_f64()),
         };
         let mut objections = measured.objections(self.limits.as_ref());
-        objections.retain(|objection| options.action == Action::Autozero || objection.concerns_tare());
+        objections.retain(|objection| options.target == ZeroTarget::Autozero || objection.concerns_tare());
         if objections.is_empty() || options.force {
             let forced = |objection| Note::of_node(node, AutozeroFact::Forced(objection));
             return Ok(objections.into_iter().map(forced).collect());
         }
         let cause = AutozeroFailure::Unsafe {
-            action: options.action,
+            target: options.target,
             objection: objections.swap_remove(0),
             channel: options.channel,
         };
@@ -240,7 +249,7 @@ impl<'a> Procedure<'a> {
     }
 
     /// Writes the signature once, and measures again.
-    fn write(&self, master: &mut Master<'_>, count: u32) -> Result<Written, Failure> {
+    fn write(&self, master: &mut Master<'_>, count: u32) -> Result<AfterWrite, Failure> {
         let (device, channel) = (self.device, &self.channel);
         let node = device.id;
         let sent = AutozeroEffect::SignatureSent { object: channel.object };
@@ -260,20 +269,20 @@ impl<'a> Procedure<'a> {
         let after = samples::take(master, device, &channel.signal.name, count).map_err(unsure)?;
         // Read the offset last: if the device restarted in between, it shows the old offset.
         let offsets = channel::offsets(master, device, channel).map_err(unsure)?;
-        let is_offset_proof = match error {
+        let proof = match error {
             None => None,
-            Some(_) if self.moved(&offsets).is_some() => Some(true),
-            Some(_) if self.has_moved(&after) && self.is_zero(&after) => Some(false),
+            Some(_) if self.changed_offset(&offsets).is_some() => Some(Proof::Offset),
+            Some(_) if self.has_moved(&after) && self.is_zero(&after) => Some(Proof::Reading),
             Some(error) => {
                 let seen = AutozeroEffect::NoChangeSeen { offset: offset.map(|(object, _)| object), signal: signal() };
                 return Err(Failure::from(error).with(node, sent).with(node, seen));
             }
         };
-        Ok(Written { offsets, after, is_offset_proof })
+        Ok(AfterWrite { offsets, after, proof })
     }
 
-    /// The offset that has changed, before and after.
-    fn moved<'b>(&'b self, now: &'b [Offset]) -> Option<(&'b Offset, &'b Offset)> {
+    /// The first offset that has changed: its old and new value.
+    fn changed_offset<'b>(&'b self, now: &'b [Offset]) -> Option<(&'b Offset, &'b Offset)> {
         let pairs = self.offsets.iter().filter_map(|old| Some((old, now.iter().find(|new| new.object == old.object)?)));
         pairs.into_iter().find(|(old, new)| old.value != new.value)
     }
@@ -289,8 +298,8 @@ impl<'a> Procedure<'a> {
         samples.mean().is_some_and(|mean| mean.abs() <= self.tolerance())
     }
 
-    /// Whether the reading proves that the device executed the signature: it moved towards zero by more than its
-    /// variation. Always false if the description names the object of the offset.
+    /// Whether the reading moved towards zero by more than its variation. This proves that the device executed the
+    /// signature. Always false if the description contains the object of the offset.
     fn has_moved(&self, after: &Samples) -> bool {
         let means = self.before.mean().zip(after.mean()).filter(|_| !self.channel.is_described);
         means.is_some_and(|(before, after)| after.abs() + self.before.spread() < before.abs())
@@ -306,7 +315,7 @@ impl<'a> Procedure<'a> {
     }
 
     /// Checks that the reading is zero afterwards.
-    fn prove(&self, written: &Written) -> Result<(), Failure> {
+    fn check_is_zero(&self, written: &AfterWrite) -> Result<(), Failure> {
         let node = self.device.id;
         let fail = |cause: AutozeroFailure| {
             Err(Failure::at(node, cause).with(node, AutozeroEffect::Undo(self.undo(&written.offsets, false))))
@@ -314,11 +323,12 @@ impl<'a> Procedure<'a> {
         if written.after.booted {
             return fail(AutozeroFailure::RestartedAfter);
         }
-        let has_acted = self.moved(&written.offsets).is_some() || self.has_moved(&written.after) || self.was_zero();
+        let has_acted =
+            self.changed_offset(&written.offsets).is_some() || self.has_moved(&written.after) || self.was_zero();
         if has_acted && self.is_zero(&written.after) {
             return Ok(());
         }
-        let offset = match self.moved(&written.offsets) {
+        let offset = match self.changed_offset(&written.offsets) {
             Some((old, new)) => OffsetChange::Changed(old.number, new.number),
             None if self.offsets.is_empty() => OffsetChange::Unreadable,
             None => OffsetChange::Unchanged,
@@ -329,17 +339,17 @@ impl<'a> Procedure<'a> {
 
     /// Stores the zero if requested, and checks that the new offset was stored. A device that restarts just before the
     /// store would store the old offset.
-    fn keep(
+    fn store(
         &self,
         master: &mut Master<'_>,
         plan: Option<StorePlan>,
-        written: &Written,
+        written: &AfterWrite,
         report: &mut Zeroed,
     ) -> Result<(), Failure> {
         let node = self.device.id;
         let Some(plan) = plan else {
             let note = Note::of_node(node, AutozeroFact::NotStored { group: self.group });
-            report.notes.extend((self.action == Action::Autozero).then_some(note));
+            report.notes.extend((self.target == ZeroTarget::Autozero).then_some(note));
             return Ok(());
         };
         let moved = AutozeroEffect::Moved(report.shift().map(|shift| self.quantity(shift)));
@@ -356,8 +366,8 @@ impl<'a> Procedure<'a> {
         Ok(())
     }
 
-    fn report(&self, written: Option<&Written>, notes: Vec<Note>) -> Zeroed {
-        let moved = written.and_then(|written| self.moved(&written.offsets));
+    fn report(&self, written: Option<&AfterWrite>, notes: Vec<Note>) -> Zeroed {
+        let moved = written.and_then(|written| self.changed_offset(&written.offsets));
         let still = || written.and_then(|written| self.offsets.first().zip(written.offsets.first()));
         let (old, new) = match moved.or_else(still) {
             Some((old, new)) => (Some(old), Some(new)),
@@ -382,13 +392,13 @@ impl<'a> Procedure<'a> {
         Quantity { value, unit: self.channel.signal.unit, decimals: self.decimals }
     }
 
-    /// How to undo it.
+    /// How to undo the change.
     fn undo(&self, now: &[Offset], stored: bool) -> Undo {
         let is_writable = |object| {
             let entry = self.device.model.as_ref().and_then(|model| model.dictionary.get(object));
             entry.is_none_or(|entry| entry.access.is_writable())
         };
-        match self.moved(now) {
+        match self.changed_offset(now) {
             Some((old, _)) if is_writable(old.object) => Undo::write(old, stored.then_some(self.group)),
             _ if stored => Undo::Restore,
             _ => Undo::Reset,
@@ -418,7 +428,7 @@ fn unit_text(unit: Option<Unit>) -> String {
     unit.map(|unit| unit.to_string()).unwrap_or_default()
 }
 
-/// The significant decimals: 0.01 % of the measuring range, else the digits of the device.
+/// The number of decimal digits that resolves 0.01 % of the measuring range; without a range, those of the device.
 fn decimals(range: Option<f64>, digits: Option<u8>) -> usize {
     let steps = range.map(|range| range / 1e4).filter(|step| *step > 0.0);
     let needed = steps.and_then(|step| (0..=9).find(|&decimals| 10f64.powi(-decimals) <= step * 1.000_001));

@@ -95,7 +95,7 @@ fn candidates(node: &Node) -> BTreeSet<ObjectId> {
     }
     all.extend(standard::single_objects());
     for signal in &node.signals {
-        all.insert(signal.value.0);
+        all.insert(signal.value_object.0);
         all.extend(signal.status);
     }
     for signal in node.channels().into_iter().take(MAX_CHANNELS) {

@@ -32,7 +32,7 @@ const REQUEST_BITS: u64 = 135;
 /// How a bit rate was tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum How {
-    /// By listening: no frame, no acknowledge and no error flag was sent.
+    /// By listening: no frame, no acknowledgement and no error flag was sent.
     Listening,
     /// By asking each node-ID for its device type.
     Asking,

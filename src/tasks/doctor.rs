@@ -6,7 +6,7 @@ use crate::bus::{Fault, Filters, Stamp};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
-use crate::master::{Clue, Error, Happening, Master, Request, SdoError, SdoFailure};
+use crate::master::{Error, Happening, Master, MissedAnswer, Request, SdoError, SdoFailure};
 use crate::measure::decode::Wanted;
 use crate::measure::sample::{Sample, Source, Status};
 use crate::node::scan::{self, Presence};
@@ -190,7 +190,7 @@ fn not_operational(state: NmtState) -> Silence {
 
 /// A node that answered before, and whose heartbeat shows now that it is stopped.
 fn is_stopped(error: &SdoError) -> bool {
-    matches!(error.failure, SdoFailure::NoAnswer { clue: Clue { state: Some(NmtState::Stopped), .. }, .. })
+    matches!(error.failure, SdoFailure::NoAnswer { missed: MissedAnswer { state: Some(NmtState::Stopped), .. }, .. })
 }
 
 /// Why nothing was heard of the requested nodes.
@@ -208,7 +208,7 @@ fn why_absent(
         // The request once more: its failure shows what was received instead of an answer.
         master.listen_to(&[node])?;
         match master.transfer_one(Request::read(node, ObjectId::DEVICE_TYPE))? {
-            Err(error) if matches!(error.failure, SdoFailure::NoAnswer { clue, .. } if clue.frame.is_none()) => {}
+            Err(error) if matches!(error.failure, SdoFailure::NoAnswer { missed, .. } if missed.frame.is_none()) => {}
             Err(error) => {
                 examination.failed(error.into());
                 return Ok(());

@@ -3,7 +3,7 @@
 //! These types contain no text for people. [`crate::output::failure`] turns them into a message and a hint.
 
 pub use crate::bus::BusError;
-pub use crate::master::{Clue, LssError, Operation, SdoError, SdoFailure, SecondAnswer};
+pub use crate::master::{LssError, MissedAnswer, Operation, SdoError, SdoFailure, SecondAnswer};
 pub use crate::measure::expression::ExpressionError;
 
 use super::note::{Effect, Rule};

@@ -85,14 +85,14 @@ pub fn targets(node: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec
             Ok(match &item {
                 Wanted::Signal(name) => {
                     let signal = find(node, name)?;
-                    let (object, data_type) = signal.value;
+                    let (object, data_type) = signal.value_object;
                     Target {
                         source: source(node.id, name, signal.unit),
                         unit: signal.unit,
                         object,
                         status: signal.status,
                         status_type: status_type(node, signal.status),
-                        overload_register: node.overload_register().filter(|_| signal.has_no_status()),
+                        overload_register: node.overload_register().filter(|_| !signal.has_status()),
                         reading: Reading::of_signal(signal, data_type, next_number()),
                     }
                 }

@@ -99,13 +99,13 @@ const MISTAKES: [(&str, &str, &str); 34] = [
     ("node", "heartbeat = \"500\"", "4:13: node.heartbeat: \"500\" has no unit (100ms, 1s)"),
     ("node", "heartbeat = \"500us\"", "4:13: node.heartbeat: the device counts in whole milliseconds"),
     ("node", "heartbeat = \"70s\"", "4:13: node.heartbeat: 70000 does not fit u16 (0 to 65535)"),
-    ("node", "hearbeat = \"500ms\"", "4:1: node.hearbeat: WIKA MH-4-CAN has no such setting (nearest: node.heartbeat)"),
+    ("node", "hearbeat = \"500ms\"", "4:1: node.hearbeat: WIKA MH-4-CAN has no such setting (similar: node.heartbeat)"),
     ("node", "startup = \"never\"", "4:11: node.startup: \"never\" is not one of: wait, auto"),
     ("node", "startup = 3", "4:11: node.startup: the device accepts only wait, auto"),
     (
         "nodes",
         "heartbeat = \"500ms\"",
-        "4:1: nodes.heartbeat: WIKA MH-4-CAN has no such setting (nearest: node.heartbeat)",
+        "4:1: nodes.heartbeat: WIKA MH-4-CAN has no such setting (similar: node.heartbeat)",
     ),
     (
         "signal.pressure",
@@ -145,7 +145,7 @@ const MISTAKES: [(&str, &str, &str); 34] = [
     (
         "signal.presure",
         "digits = 3",
-        "4:1: signal.presure.digits: WIKA MH-4-CAN has no such setting (nearest: signal.pressure.digits)",
+        "4:1: signal.presure.digits: WIKA MH-4-CAN has no such setting (similar: signal.pressure.digits)",
     ),
     ("signal.pressure", "span-end = \"5 bar\"", "4:1: signal.pressure.span-end: WIKA MH-4-CAN has no such setting"),
     (
@@ -160,7 +160,7 @@ const MISTAKES: [(&str, &str, &str); 34] = [
     ),
     ("tpdo.1", "event-timer = \"90s\"", "4:15: tpdo.1.event-timer: 90000 does not fit u16 (0 to 65535)"),
     ("tpdo.1", "inhibit-time = \"5ms\"", "4:1: tpdo.1.inhibit-time: WIKA MH-4-CAN has no such setting"),
-    ("tpdo.1", "signals = [\"pressure\", \"presure\"]", "4:11: tpdo.1.signals: it has no object or signal \"presure\""),
+    ("tpdo.1", "signals = [\"pressure\", \"presure\"]", "4:11: tpdo.1.signals: no object or signal \"presure\""),
     (
         "tpdo.1",
         "signals = [\"pressure\", \"temperature\", \"0x9130:1/32\"]",
@@ -180,7 +180,7 @@ const MISTAKES: [(&str, &str, &str); 34] = [
     (
         "tpdo.9",
         "enabled = true",
-        "4:1: tpdo.9.enabled: WIKA MH-4-CAN has no such setting (nearest: tpdo.1.enabled, tpdo.2.enabled)",
+        "4:1: tpdo.9.enabled: WIKA MH-4-CAN has no such setting (similar: tpdo.1.enabled, tpdo.2.enabled)",
     ),
     (
         "address",

@@ -127,7 +127,7 @@ fn text_that_is_not_an_address_is_a_name() {
         }
     }
     let done = bench.run("--eds x.eds sdo read 1 ofset").exit(2);
-    assert!(done.stderr.contains("nearest: offset"), "{}", done.stderr);
+    assert!(done.stderr.contains("similar names: offset"), "{}", done.stderr);
     let done = bench.run("--eds x.eds log 1 heartbeat --poll 100ms --count 2").exit(0);
     assert!(done.stdout.contains(",1,heartbeat,0,"), "{}", done.stdout);
 }

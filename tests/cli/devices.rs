@@ -40,7 +40,7 @@ fn objects_of_an_eds_need_no_bus() {
     assert_eq!(table.lines().count(), 3, "{table}");
     bench
         .run("objects --eds x.eds ofset")
-        .fails(2, "cangauge: the EDS file has no object \"ofset\"\nhint: nearest: offset\n");
+        .fails(2, "cangauge: the EDS file has no object \"ofset\"\nhint: similar names: offset\n");
     bench.run("objects 200").refuses("\"200\" is not a node-ID (1 to 127)");
     bench.run("objects nothing").refuses("no built-in device \"nothing\"");
 }
@@ -180,8 +180,8 @@ fn descriptions_of_the_user_are_found_and_have_priority() {
 fn description_without_a_manual_page_allows_reading_only() {
     let refusal = |name: &str, unchanged: &str| {
         format!(
-            "cangauge: node 1: no manual page supports the description {name}{unchanged}\n\
-             hint: if it fits, name it: --device {name}\n"
+            "cangauge: node 1: the description {name} is not confirmed by a manual{unchanged}\n\
+             hint: if it is the right description, add: --device {name}\n"
         )
     };
     for (name, signal) in [("hydronautics", "pressure"), ("epson-a552", "acceleration-x"), ("epson-g552", "")] {
@@ -196,7 +196,7 @@ fn description_without_a_manual_page_allows_reading_only() {
             let unchanged = if line.starts_with("lss") { "; nothing was changed" } else { "" };
             assert_eq!(done.stderr, refusal(name, unchanged), "{line}");
             let done = bench.run(&format!("{line} --device {name}"));
-            assert!(!done.stderr.contains("no manual page"), "{line}: {}", done.stderr);
+            assert!(!done.stderr.contains("not confirmed by a manual"), "{line}: {}", done.stderr);
         }
         let info = bench.run("info 1 -f json").exit(0).json();
         assert_eq!((info[0]["device"].as_str(), info[0]["source"].as_str()), (Some(name), Some("built-in")));

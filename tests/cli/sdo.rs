@@ -176,7 +176,7 @@ fn unknown_names_are_refused() {
     let bench = Bench::of("mh4@5");
     bench
         .run("sdo read 5 vendor-di")
-        .fails(2, "cangauge: node 5: WIKA MH-4-CAN has no object \"vendor-di\"\nhint: nearest: vendor-id\n");
+        .fails(2, "cangauge: node 5: WIKA MH-4-CAN has no object \"vendor-di\"\nhint: similar names: vendor-id\n");
     bench.run("sdo read 5 nonsense").fails(2, "cangauge: node 5: WIKA MH-4-CAN has no object \"nonsense\"\n");
     bench.run("sdo read 5 0x10180:1").exit(2);
     bench.run("sdo read 5 0x1018:256").exit(2);

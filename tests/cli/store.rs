@@ -70,7 +70,7 @@ fn custom_cob_ids_are_not_lost_by_a_store() {
     assert_eq!(saves, ["2310100273617665", "2310100373617665"]);
     assert_eq!(
         done.stderr,
-        "node 5: comm and app are stored instead of all, which would reset these to their defaults: \
+        "node 5: stored comm and app, because storing all would reset these COB-IDs: \
          0x1800:1 (0x400001AA)\n\
          node 5: only group \"all\" stores these; they were not saved: node-id, bit-rate\n\
          node 5: the state before the reset is unknown; the node is in the state in which it boots\n"

@@ -274,7 +274,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
         }
         Command::Autozero { node: id, channel, force, store, dry_run } => {
             let options = autozero::Options {
-                action: autozero::Action::Autozero,
+                target: autozero::ZeroTarget::Autozero,
                 channel: *channel,
                 limit: autozero::Limit::Default,
                 samples: 4,

@@ -202,6 +202,6 @@ fn unknown_width_is_read_from_the_device() {
     let failure = bench.map(&request(&["ch2"]), false).unwrap_err();
     assert_eq!(
         (failure.kind(), ErrorMessage::of(&failure).message.as_str()),
-        (Kind::Usage, "node 9: it has no object or signal \"ch2\"")
+        (Kind::Usage, "node 9: no object or signal \"ch2\"")
     );
 }

@@ -13,7 +13,7 @@ use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, State};
 use cangauge::tasks::Fact;
 use cangauge::tasks::autozero::AutozeroFact;
-use cangauge::tasks::autozero::{Action, Limit, Options, Zeroed, autozero};
+use cangauge::tasks::autozero::{Limit, Options, ZeroTarget, Zeroed, autozero};
 use cangauge::tasks::store::{self, Group, StoreReport, Verified};
 use cangauge::tasks::{Failure, Kind, restore};
 use std::path::Path;
@@ -173,7 +173,7 @@ const STILL: &str = "[[device.channel]]\nchannel = 1\nbase = 0.0625\namplitude =
 
 fn zero(bus: &mut FaultyBus, store: bool) -> Result<Zeroed, Failure> {
     let options = Options {
-        action: Action::Autozero,
+        target: ZeroTarget::Autozero,
         channel: None,
         limit: Limit::Default,
         samples: 2,

@@ -12,7 +12,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog;
-use cangauge::master::{Clue, Happening, Master, SdoError, SdoFailure, Timing};
+use cangauge::master::{Happening, Master, MissedAnswer, SdoError, SdoFailure, Timing};
 use cangauge::sim::Bench;
 use cangauge::tasks::log::{LogOptions, Mode, Remark, log};
 use std::collections::{BTreeMap, VecDeque};
@@ -180,5 +180,8 @@ fn late_answer_stays_late_although_it_is_read_later() {
     let mut bus = stall(inner, 0..500, false);
     let timeout = Duration::from_millis(100);
     let error = read(&mut Master::new(&mut bus, Timing { timeout, retries: 0 })).expect_err("no answer in time");
-    assert_eq!(error.failure, SdoFailure::NoAnswer { waited: timeout, started: false, clue: Clue::default() });
+    assert_eq!(
+        error.failure,
+        SdoFailure::NoAnswer { waited: timeout, started: false, missed: MissedAnswer::default() }
+    );
 }

@@ -1,8 +1,8 @@
 //! Which process holds a name in the abstract namespace.
 //!
-//! The kernel names the peer of a connection. The connection is non-blocking: a holder that does not accept, or whose
-//! queue is full, cannot stop this process. In that case the process is looked up in `/proc`, which shows the sockets
-//! of other users' processes only to root.
+//! The kernel reports the peer of a connection. The connection is non-blocking, so a holder that does not accept, or
+//! whose queue is full, cannot block this process. In that case the holder is searched in `/proc`, which shows sockets
+//! of other users only to root.
 
 use super::Holder;
 use socket2::{Domain, SockAddr, Socket, Type};
@@ -57,7 +57,7 @@ fn peer(name: &[u8]) -> io::Result<libc::ucred> {
 fn owner(name: &[u8]) -> Option<u32> {
     let sockets = fs::read("/proc/self/net/unix").ok()?;
     let ending = [b" @", name].concat();
-    // Connections that wait in its queue have the same name. They belong to no process.
+    // Connections that wait in the queue have the same name, but do not belong to a process.
     let lines = sockets.split(|&byte| byte == b'\n').filter(|line| line.ends_with(&ending));
     // Num: RefCount Protocol Flags Type St Inode Path
     let inodes = lines.filter_map(|line| std::str::from_utf8(line).ok()?.split_ascii_whitespace().nth(6));
@@ -81,7 +81,7 @@ fn user_name(user: u32) -> Option<String> {
     })
 }
 
-/// A process chooses its own name: nothing in it may control a terminal.
+/// Replaces control characters. A process chooses its name, which must not control a terminal.
 fn printable(text: &str) -> String {
     let safe = |character: char| if character.is_ascii_graphic() || character == ' ' { character } else { '?' };
     text.chars().take(MAX_NAME).map(safe).collect()

@@ -1,8 +1,8 @@
 //! Claims as Unix sockets in the abstract namespace.
 //!
-//! Two rules keep processes apart. A process that claims single nodes binds their names and then checks that
-//! "every node" is free. A process that claims every node binds that name and then checks each node. If both
-//! meet, at least one sees the other; the one with single nodes releases them and waits.
+//! Two rules keep processes apart. A process that claims single nodes binds their names and then checks that "every
+//! node" is free. A process that claims every node binds that name and then checks each node. If two processes do this
+//! at the same time, at least one detects the other. The process with single nodes then releases them and waits.
 
 use super::holder::identify;
 use super::{Claim, ClaimError, Holder, IfHeld, Part};
@@ -17,11 +17,11 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Waits shorter than this are not reported: most commands end sooner.
+/// Shorter waits are not reported, because most commands end sooner.
 const SHORT_WAIT: Duration = Duration::from_millis(500);
-/// The interval between two attempts to get a name, and between two looks at the queues of a holder.
+/// The interval between two attempts to get a name, and between two checks of the queues of a holder.
 const RETRY_INTERVAL: Duration = Duration::from_millis(20);
-/// More nodes than this are claimed as every node. Each name takes a file descriptor.
+/// More nodes than this are claimed as every node. Each name needs a file descriptor.
 const MAX_SINGLE_NODES: usize = 16;
 
 /// The claims of this process, until the value is dropped or the process ends.
@@ -35,12 +35,12 @@ pub struct Claims {
 }
 
 impl Claims {
-    /// Claims the parts of `claim` on the interface `name`; all names of an interface count as one. `report` gets the
-    /// first holder that is waited for longer than half a second, and each holder that is not waited for.
+    /// Claims the parts of `claim` on the interface `name`; all names of an interface count as one. `report` is called
+    /// for the first wait longer than half a second, and for each holder that is ignored.
     ///
     /// # Errors
-    /// [`ClaimError::InUse`] after the waiting time; an interrupt; a failure of the system. A system that does not have
-    /// such sockets, or forbids them, has no claims; this is not an error.
+    /// [`ClaimError::InUse`] after the waiting time; an interrupt; a failure of the system. If the system does not
+    /// support or allow such sockets, nothing is claimed; this is not an error.
     pub fn take(
         name: &str,
         claim: &Claim,
@@ -87,15 +87,15 @@ impl Claims {
 impl Drop for Claims {
     fn drop(&mut self) {
         self.stop = None;
-        // The thread holds the names too: they are free when it has ended.
+        // The thread also holds the names: they are released when it ends.
         if let Some(thread) = self.drain.take() {
             let _ = thread.join();
         }
     }
 }
 
-/// Empties the queues of the sockets until `stopped` is closed. Each process that asks who holds a name connects;
-/// without this it would occupy a place in the queue until the holder ends.
+/// Empties the queues of the sockets until `stopped` is closed. Each process that asks for the holder of a name
+/// connects. Without this thread, the connection would stay in the queue until the holder ends.
 fn drain(listeners: &[UnixListener], stopped: &UnixStream) {
     let fds: Vec<_> = listeners.iter().map(AsFd::as_fd).chain([stopped.as_fd()]).collect();
     loop {
@@ -107,7 +107,7 @@ fn drain(listeners: &[UnixListener], stopped: &UnixStream) {
         for listener in listeners {
             while listener.accept().is_ok() {}
         }
-        // A process that connects without end must not keep this one busy.
+        // A process that connects continuously must not keep this one busy.
         match poll::readable([stopped.as_fd()], RETRY_INTERVAL) {
             Ok([false]) => {}
             Ok([true]) | Err(_) => return,
@@ -115,7 +115,7 @@ fn drain(listeners: &[UnixListener], stopped: &UnixStream) {
     }
 }
 
-/// The names of a claim. All processes take them in this order, so that they do not wait for each other in a circle.
+/// The names of a claim. All processes bind them in this order, which prevents a deadlock.
 fn parts(claim: &Claim) -> Vec<Part> {
     match claim {
         Claim::Nothing => Vec::new(),
@@ -129,23 +129,23 @@ fn parts(claim: &Claim) -> Vec<Part> {
     }
 }
 
-/// A claim that is being taken.
+/// A claim in progress.
 struct Attempt<'a> {
     /// The interface.
     key: String,
     if_held: IfHeld,
     started: Instant,
-    /// Present from the first wait on. Until then Ctrl-C ends the program by itself.
+    /// Set from the first wait on. Before, Ctrl-C ends the program by itself.
     interrupts: Option<Interrupts>,
     is_reported: bool,
-    /// The holder of this part: it is identified only once.
+    /// The holder of this part, identified only once.
     holder: Option<(Part, Holder)>,
     report: &'a mut dyn FnMut(&ClaimError),
     held: Vec<UnixListener>,
 }
 
 impl Attempt<'_> {
-    /// Takes all parts, waiting for each. `false`: it had to release them and must begin again.
+    /// Claims all parts, and waits for each. `false` if all parts were released and the attempt must be repeated.
     fn take_all(&mut self, parts: &[Part]) -> Result<bool, ClaimError> {
         for &part in parts {
             loop {
@@ -168,7 +168,7 @@ impl Attempt<'_> {
                 while self.is_held(node)? && self.wait_for(node)? {}
             }
         } else if self.is_held(Part::EveryNode)? {
-            // Its holder may be waiting for one of these nodes.
+            // The holder may be waiting for one of these nodes.
             let held = std::mem::take(&mut self.held);
             if self.if_held == IfHeld::Continue {
                 self.held = held;
@@ -206,12 +206,12 @@ impl Attempt<'_> {
         }
     }
 
-    /// Whether another process holds a part that this one does not want to hold itself.
+    /// Whether another process holds a part that this process does not claim.
     fn is_held(&self, part: Part) -> Result<bool, ClaimError> {
         Ok(matches!(self.bind(part)?, Bound::InUse))
     }
 
-    /// Waits a moment for the holder of a part. `false`: continue beside the holder.
+    /// Waits a short time for the holder of a part. `false` if the command continues in spite of the holder.
     fn wait_for(&mut self, part: Part) -> Result<bool, ClaimError> {
         let holder = match self.holder.take() {
             Some((of, holder)) if of == part && holder.process.is_some() => holder,
@@ -251,6 +251,6 @@ impl Attempt<'_> {
 enum Bound {
     Held(UnixListener),
     InUse,
-    /// This system has no such sockets.
+    /// This system does not support such sockets.
     Unavailable,
 }

@@ -1,4 +1,4 @@
-//! Claims of several holders in one process, and of other programs that behave badly.
+//! Claims of several holders in one process, and of programs that do not follow the rules.
 
 use super::*;
 use socket2::{Domain, SockAddr, Socket, Type};
@@ -11,7 +11,7 @@ fn nodes(nodes: &[u8]) -> Claim {
     Claim::Nodes(nodes.iter().map(|&node| NodeId::new(node).expect("a node-ID")).collect())
 }
 
-/// A bus that no other test has.
+/// A bus name that no other test uses.
 fn bus(test: &str) -> String {
     format!("test-{}-{test}", std::process::id())
 }
@@ -121,7 +121,7 @@ fn hostile(bus: &str, part: &str) -> (UnixListener, Vec<Socket>) {
     let listener = UnixListener::bind_addr(&address(bus, part)).expect("free");
     let path = format!("\0cangauge/{bus}/{part}");
     let mut connections = Vec::new();
-    // Few places: the queue is as long as the system allows.
+    // Sets a short queue, because the default length is the limit of the system.
     socket2::SockRef::from(&listener).listen(2).expect("a shorter queue");
     loop {
         let socket = Socket::new(Domain::UNIX, Type::STREAM.nonblocking(), None).expect("a socket");
@@ -160,7 +160,7 @@ fn a_name_without_a_listener_is_held_too() {
 fn a_holder_empties_its_queue() {
     let bus = bus("drain");
     let held = take(&bus, &nodes(&[5]), 0).expect("free");
-    // Beyond the longest queue (net.core.somaxconn).
+    // More connections than the longest queue holds (net.core.somaxconn).
     let longest = std::fs::read_to_string("/proc/sys/net/core/somaxconn").expect("procfs");
     let longest: usize = longest.trim().parse().expect("a number");
     let path = format!("\0cangauge/{bus}/5");

@@ -1,4 +1,4 @@
-//! The real and the virtual clock of the simulated bus, and waits that the user can interrupt.
+//! The real and the virtual clock of the simulated bus, and interruptible waits.
 
 use crate::bus::interrupt::Interrupts;
 use crate::bus::time::{Mono, Wall};
@@ -19,8 +19,8 @@ pub const VIRTUAL_EPOCH: Wall = Wall::at(Duration::from_secs(1_767_225_600));
 
 /// Waits on the clock of the host, and reports an interrupt by the user.
 pub trait Sleeper: Send {
-    /// Waits for `length`. Returns `true` immediately, and only once, if the user asked to stop. With a length of zero
-    /// it only checks.
+    /// Waits for `length`. If the user asks to stop, returns `true` immediately, and only once. With a length of zero,
+    /// only checks for a stop.
     fn sleep(&mut self, length: Duration) -> bool;
 }
 

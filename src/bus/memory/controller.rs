@@ -1,13 +1,13 @@
-//! The error counters and states of a CAN controller (ISO 11898-1, fault confinement), simplified. They show the effect
-//! of a wrong bit rate.
+//! The error counters and states of a CAN controller (ISO 11898-1, fault confinement), simplified. Used to simulate the
+//! effect of a wrong bit rate.
 
 use crate::bus::Fault;
 use crate::bus::time::Mono;
 use crate::canopen::wire_length::bit_time;
 use std::time::Duration;
 
-/// The wait of an error-passive controller before a retry. A real one waits a few bit times. The longer wait keeps an
-/// unacknowledged frame from filling hours of virtual time with errors.
+/// The wait of an error-passive controller before a retry. A real controller waits a few bit times. The longer wait
+/// limits the number of errors from an unacknowledged frame in hours of virtual time.
 pub(super) const PASSIVE_PAUSE: Duration = Duration::from_millis(10);
 
 const WARNING: u16 = 96;
@@ -19,11 +19,11 @@ const RECOVERY_BITS: u32 = 128 * 11;
 /// The outcome of a transmission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// All receivers got it.
+    /// All receivers received the frame.
     Delivered,
-    /// No station acknowledged it.
+    /// No station acknowledged the frame.
     Unacknowledged,
-    /// It was destroyed: a station at another bit rate, or two senders with one identifier.
+    /// The frame was destroyed by a station at another bit rate, or by two senders with one identifier.
     Disturbed,
 }
 
@@ -32,7 +32,7 @@ pub(super) enum Outcome {
 pub(super) struct Controller {
     transmit_errors: u16,
     receive_errors: u16,
-    /// Until when it is bus-off or waits for a retry.
+    /// The end of bus-off, or of the wait for a retry.
     pub(super) waits_until: Option<Mono>,
 }
 
@@ -67,12 +67,12 @@ impl Controller {
         }
     }
 
-    /// Whether its error flags destroy frames of others.
+    /// Whether the error flags of the controller destroy frames of other stations.
     pub(super) fn disturbs(&self) -> bool {
         self.level() < Level::Passive
     }
 
-    /// Counts a transmission of this controller. A missing acknowledge leads to error-passive at most.
+    /// Counts a transmission of this controller. A missing acknowledgement leads to error-passive at most.
     pub(super) fn transmitted(&mut self, outcome: Outcome) {
         match outcome {
             Outcome::Delivered => self.transmit_errors = self.transmit_errors.saturating_sub(1),
@@ -91,7 +91,7 @@ impl Controller {
         }
     }
 
-    /// Goes bus-off at `now`, until the recovery time of the standard is over.
+    /// Switches to bus-off at `now`, for the recovery time of the standard.
     pub(super) fn switch_off(&mut self, now: Mono, bit_rate: u32) {
         *self = Controller { waits_until: Some(now + bit_time(RECOVERY_BITS, bit_rate)), ..Controller::default() };
     }

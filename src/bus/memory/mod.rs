@@ -1,5 +1,5 @@
-//! A simulated CAN bus inside the process: arbitration, bit rates, a real clock for interactive use or a virtual one
-//! for tests, and stations. The simulated devices are stations.
+//! A simulated CAN bus inside the process, with arbitration and bit rates. The clock is real for interactive use, or
+//! virtual for tests. The simulated devices are stations on the bus.
 
 mod clock;
 mod controller;
@@ -25,17 +25,17 @@ pub const QUEUE_LENGTH: usize = 10;
 /// The default bit rate in bit/s.
 pub const BIT_RATE: u32 = 250_000;
 
-/// A simulated CAN bus, as the program sees it.
+/// A simulated CAN bus, from the side of the program.
 ///
-/// The program is one station. It receives the frames of the others but not its own, as on SocketCAN. All events are
-/// processed in [`Bus::receive`] and [`Bus::send`]; there is no thread. On the real clock, events that were due in the
-/// meantime are processed later, each with its own time.
+/// The program is one station. As on SocketCAN, it receives the frames of other stations, but not its own. All events
+/// are processed in [`Bus::receive`] and [`Bus::send`]; there is no thread. On the real clock, events that were due in
+/// the meantime are processed later, each with its own time.
 ///
-/// Each station has a bit rate. A frame is delivered if a station with the same bit rate acknowledges it and none
+/// Each station has a bit rate. A frame is delivered if a station with the same bit rate acknowledges it and no station
 /// destroys it. A station at a different bit rate receives only errors, and destroys frames until it is error-passive.
-/// Two frames with one identifier that start together merge if they are equal, and destroy each other if not. A failed
-/// frame is sent again. The program gets all errors on the bus and the states of its controller as events. After
-/// bus-off, only [`BitRateControl::set_bit_rate`] brings it back.
+/// If two frames with the same identifier start together, equal frames merge, and different frames destroy each other.
+/// A failed frame is sent again. The program receives all errors on the bus and the states of its controller as events.
+/// Only [`BitRateControl::set_bit_rate`] ends bus-off.
 pub struct MemoryBus {
     name: String,
     bit_rate: u32,
@@ -54,7 +54,7 @@ pub struct MemoryBus {
     inbox: VecDeque<Event>,
     filters: Filters,
     wire: Wire,
-    /// The bit rate of the last delivered frame, used by stations that follow the others.
+    /// The bit rate of the last delivered frame, used by stations with [`Tuning::Follows`].
     heard_rate: u32,
     interrupts: BTreeSet<Mono>,
     sleeper: Box<dyn Sleeper>,
@@ -65,8 +65,8 @@ struct Place {
     station: Box<dyn Station>,
     out: Outbox,
     controller: Controller,
-    /// The result of [`Station::next_wake`], or an earlier moment. It is updated after each call of the station:
-    /// to ask 127 stations at every step would take most of the time.
+    /// The result of [`Station::next_wake`], or an earlier moment. Updated after each call of the station, because
+    /// asking 127 stations at every step would be slow.
     next_wake: Option<Mono>,
 }
 
@@ -81,7 +81,7 @@ impl Place {
 }
 
 impl MemoryBus {
-    /// Makes a bus without stations, with this clock.
+    /// Creates a bus without stations, with this clock.
     pub fn new(clock: Clock) -> MemoryBus {
         MemoryBus {
             name: "sim".to_owned(),
@@ -197,7 +197,7 @@ impl MemoryBus {
             self.inbox.push_back(Event::Interrupted);
             return true;
         }
-        // A frame that is complete now is delivered before stations wake. All stations that wake now take part in the
+        // A complete frame is delivered before stations wake. All stations that wake at this moment take part in the
         // arbitration.
         if let Wire::Busy(transmission) = &self.wire
             && transmission.complete <= moment
@@ -294,7 +294,7 @@ impl Bus for MemoryBus {
     }
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        // Frames that were complete before now passed the old filters.
+        // The old filters apply to frames that were complete before.
         self.catch_up();
         self.filters = filters.clone();
         Ok(())

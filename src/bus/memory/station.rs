@@ -7,7 +7,8 @@ use std::collections::VecDeque;
 
 /// A simulated device on a bus, driven by frames and time.
 ///
-/// It never waits and has no clock: the caller passes the time. `Any` lets a test inspect an attached station.
+/// A station never waits and has no clock: the caller passes the time. `Any` allows a test to inspect an attached
+/// station.
 pub trait Station: Any + Send {
     /// The power is switched on at `now`.
     fn power_on(&mut self, now: Mono, out: &mut Outbox);
@@ -18,9 +19,8 @@ pub trait Station: Any + Send {
     /// The moment of [`Station::next_wake`] was reached.
     fn wake(&mut self, now: Mono, out: &mut Outbox);
 
-    /// When the station must be woken next. After [`Station::wake`] at `now` this must be later than `now`, or time
-    /// would stand still. The value may change only in the other functions of this trait, and while the station is
-    /// borrowed from [`super::MemoryBus::stations_mut`].
+    /// When the station must be woken next. After [`Station::wake`] at `now`, this must be later than
+    /// `now`; otherwise time would stop. The value may change only in the other functions of this trait, or through [`super::MemoryBus::stations_mut`].
     fn next_wake(&self) -> Option<Mono>;
 
     /// A frame of this station was sent completely at `now`.
@@ -31,7 +31,8 @@ pub trait Station: Any + Send {
         Tuning::Follows
     }
 
-    /// Gives the bit rate of the bus in bit/s: before [`Station::power_on`], and when the program changes it.
+    /// Passes the bit rate of the bus in bit/s: before [`Station::power_on`], and when the program changes the bit
+    /// rate.
     fn on_bus_bit_rate(&mut self, _bit_rate: u32) {}
 }
 
@@ -42,7 +43,7 @@ pub enum Tuning {
     Follows,
     /// This bit rate, in bit/s.
     At(u32),
-    /// None: the station has no power, or its controller is off.
+    /// No bit rate: the station has no power, or its controller is off.
     Off,
 }
 
@@ -53,7 +54,7 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// Adds a frame after the waiting ones.
+    /// Adds a frame after the waiting frames.
     pub fn send(&mut self, frame: Frame) {
         self.frames.push_back(frame);
     }

@@ -3,7 +3,7 @@ use crate::bus::time::Wall;
 use crate::canopen::wire_length::frame_bits;
 use std::time::Duration;
 
-/// Sends given frames at given times. It records the frames received and the times when its own were sent.
+/// Sends given frames at given times. It records the received frames and the times when its own frames were sent.
 #[derive(Default)]
 struct Script {
     planned: VecDeque<(Mono, Frame)>,
@@ -96,7 +96,7 @@ fn the_program_does_not_receive_its_own_frames() {
 fn the_lowest_identifier_wins_and_no_frame_is_interrupted() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     // 7FFh starts alone and is not interrupted. Then 081h wins, then 182h, then the 29-bit frame, although they were
-    // queued in the reverse order. The order within one station stays.
+    // queued in the reverse order. The order within one station does not change.
     bus.attach(script(&[(0, "7FF#"), (10, "081#01")]));
     bus.attach(script(&[(5, "06080000#"), (5, "000#0100")]));
     bus.attach(script(&[(6, "182#02")]));
@@ -142,7 +142,7 @@ fn the_transmit_queue_is_limited_and_empties_over_time() {
         bus.send(&frame("080#")).expect("room for ten");
     }
     assert!(matches!(bus.send(&frame("080#")), Err(BusError::QueueFull)));
-    // When the first frame is on the bus there is room for exactly one more.
+    // When the first frame is on the bus, the queue has space for exactly one more.
     drain(&mut bus, us(1));
     bus.send(&frame("080#")).expect("room for one");
     assert!(matches!(bus.send(&frame("080#")), Err(BusError::QueueFull)));
@@ -205,7 +205,7 @@ fn an_interrupt_comes_once_at_its_time() {
     assert_eq!(bus.receive(us(9000)).expect("no error"), Event::Timeout);
 }
 
-/// Asks to stop at the `n`-th wait.
+/// Reports a stop by the user at the `n`-th wait.
 struct StopsAt(u32);
 
 impl Sleeper for StopsAt {
@@ -232,7 +232,7 @@ fn the_real_clock_waits_and_missed_frames_keep_their_times() {
     let mut bus = MemoryBus::new(Clock::Real);
     bus.attach(script(&[(0, "701#00"), (2000, "701#05"), (30_000, "701#7F")]));
     let before = Wall::now();
-    // Two frames arrive while the program does something else. They are received with their own times.
+    // Two frames arrive while the program is busy. They are received with their own times.
     std::thread::sleep(Duration::from_millis(5));
     let first = (Mono::START + length("701#00")).since_start().as_micros();
     let second = (us(2000) + length("701#05")).since_start().as_micros();

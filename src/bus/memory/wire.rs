@@ -1,4 +1,4 @@
-//! The bus line: arbitration, acknowledge, errors, bit rates.
+//! The bus line: arbitration, acknowledgement, errors, bit rates.
 
 use super::controller::{Controller, Level, Outcome, PASSIVE_PAUSE};
 use super::station::Tuning;
@@ -22,7 +22,7 @@ pub(super) enum Wire {
     Busy(Transmission),
 }
 
-/// A frame on the bus, or several that collide.
+/// A frame on the bus, or several colliding frames.
 pub(super) struct Transmission {
     /// The senders and their frames. The frames are equal unless they collide.
     pub(super) senders: Vec<(Sender, Frame)>,
@@ -42,7 +42,7 @@ impl Transmission {
 }
 
 impl MemoryBus {
-    /// All stations with a frame to send: from when on, sender, frame.
+    /// All stations with a frame to send: earliest start, sender, frame.
     pub(super) fn contenders(&self) -> impl Iterator<Item = (Mono, Sender, Frame)> {
         let ready = |controller: &Controller| controller.waits_until.unwrap_or(Mono::START);
         let is_out = self.mode == Mode::ListenOnly || self.controller.level() == Level::Off;
@@ -180,7 +180,7 @@ impl MemoryBus {
     }
 
     /// Queues a failed frame again. An error-passive sender waits first. The waits differ, so that two colliding
-    /// stations do not collide again and again. A bus-off station drops its frames.
+    /// stations do not collide repeatedly. A bus-off station drops its frames.
     fn requeue(&mut self, transmission: &Transmission, outcome: Outcome) {
         for (sender, frame) in &transmission.senders {
             match *sender {

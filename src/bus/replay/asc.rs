@@ -1,6 +1,7 @@
 //! Vector ASC: `   0.016728 1  181             Rx   d 4 D2 04 00 00`.
 //!
-//! The header has the date, the number base, and whether times count from the start or from the event before.
+//! The header has the date and the number base. It also shows whether times count from the start or from the previous
+//! event.
 
 use super::text::{FrameOrFault, TimeZone, data_frame, date, digits, identifier, number, remote_frame, seconds};
 use super::{Line, Parser};
@@ -8,8 +9,8 @@ use crate::bus::{Fault, Wall};
 use crate::canopen::id::CanId;
 use std::time::Duration;
 
-/// The times of a trigger block with a date start at zero if its first event is before this time. Else they count from
-/// the start of the measurement.
+/// If the first event of a trigger block with a date is before this time, the times start at the block. Otherwise they
+/// start at the measurement.
 const BLOCK_START: Duration = Duration::from_secs(1);
 
 /// The flag of a CAN FD frame, and that of a remote frame.
@@ -75,7 +76,7 @@ impl Asc {
         identifier(text.trim_end_matches('x'), 10, text.ends_with('x'))
     }
 
-    /// What follows the channel: `181 Rx d 2 01 02`, `181 Tx r 2`, `ErrorFrame`.
+    /// Parses the text after the channel: `181 Rx d 2 01 02`, `181 Tx r 2`, `ErrorFrame`.
     fn event(&self, words: &[&str]) -> Option<Option<FrameOrFault>> {
         let (first, rest) = words.split_first()?;
         if first.eq_ignore_ascii_case("errorframe") {

@@ -1,8 +1,8 @@
 //! The lines of a candump recording.
 //!
 //! `candump -L` writes `(1436509053.249713) can0 123#1122`. On a screen, candump writes
-//! `(1436509053.249713)  can0  123   [2]  11 22`, and with `-tA` a date in place of the seconds. Without `-t` the screen
-//! form has no times.
+//! `(1436509053.249713) can0 123 [2] 11 22`, and with `-tA` a date instead of the seconds. Without `-t` the screen form
+//! has no times.
 
 use super::text::{ERROR_FRAME, FrameOrFault, TimeZone, fault, number};
 use super::{Line, Parser};
@@ -32,12 +32,12 @@ impl Parser for Candump {
     }
 }
 
-/// Whether a line is one of the screen form without time.
+/// Whether a line has the screen form without time.
 pub(super) fn has_no_time(text: &str) -> bool {
     screen_frame(text).is_some()
 }
 
-/// The frame of `candump -L`; `None` inside for CAN FD.
+/// The frame of `candump -L`; `Some(None)` for CAN FD.
 fn log_frame(text: &str) -> Option<Option<FrameOrFault>> {
     if text.contains("##") {
         return Some(None);

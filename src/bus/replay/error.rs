@@ -5,7 +5,7 @@ use super::format::{FileFormat, RecordingFormat};
 /// A file that is not a usable recording.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RecordingError {
-    /// The file contains nothing.
+    /// The file is empty.
     #[error("the file is empty")]
     Empty,
     /// The file has another format.
@@ -14,7 +14,7 @@ pub enum RecordingError {
     /// No line shows a known format.
     #[error("not a recording in a known format (candump, Vector ASC, PEAK TRC, CSV of python-can)")]
     UnknownFormat,
-    /// The format is known, and no line contains a frame.
+    /// The format is known, but no line contains a frame.
     #[error("this is {} without frames", .0.name())]
     NoFrames(RecordingFormat),
     /// The compressed data ends before its first line.
@@ -26,7 +26,7 @@ pub enum RecordingError {
     /// The times count from the previous frame (`candump -td`), or their resolution is too low.
     #[error("the times do not increase: they seem to be intervals from frame to frame (candump -td)")]
     Intervals,
-    /// Frames of two channels, and none is chosen.
+    /// The recording has frames of two channels, but none is chosen.
     #[error("frames of {0} and of {1}: choose one of them")]
     SeveralChannels(String, String),
     /// No frame of the chosen channel.

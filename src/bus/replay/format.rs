@@ -93,7 +93,7 @@ impl RecordingFormat {
         }
         let is_direction = |word: &&str| ["rx", "tx"].contains(word);
         let is_number = |word: &str| !word.is_empty() && number(word).is_some();
-        // Without its header.
+        // Lines of files without a header.
         let format = match words[..] {
             [time, "canfd", ..] if text::seconds(time).is_some() => RecordingFormat::Asc,
             [time, channel, _, ref rest @ ..]
@@ -133,7 +133,7 @@ impl FileFormat {
         }
     }
 
-    /// The format of a binary file by its first bytes; `None` if it is not one of these.
+    /// The format of a binary file by its first bytes; `None` for other formats.
     pub(super) fn of(start: &[u8]) -> Option<FileFormat> {
         let magic: [(&[u8], FileFormat); 17] = [
             (super::lines::GZIP, FileFormat::Gzip),

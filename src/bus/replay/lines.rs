@@ -1,11 +1,11 @@
-//! The lines of a recording: of a file or a pipe, compressed or not.
+//! Reads the lines of a recording from a file or a pipe, compressed or not.
 
 use flate2::bufread::MultiGzDecoder;
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 
-/// The longest line in bytes. The rest of a longer one is ignored.
+/// The longest line in bytes. The rest of a longer line is ignored.
 const MAX_LINE: u64 = 4096;
 
 /// The first bytes of a file, which show its format.
@@ -23,7 +23,7 @@ pub(super) struct Lines {
     pub(super) start: Vec<u8>,
     /// Lines that were read ahead, with their numbers.
     ahead: VecDeque<(u64, Vec<u8>)>,
-    /// Lines read from the file.
+    /// The number of lines read from the file.
     number: u64,
     /// Whether compressed data ends too early.
     pub(super) is_cut: bool,
@@ -77,7 +77,7 @@ impl Lines {
         Ok(self.ahead.back().map(|(_, line)| &line[..]))
     }
 
-    /// How many lines were read from the file.
+    /// The number of lines read from the file.
     pub(super) fn count(&self) -> u64 {
         self.number
     }

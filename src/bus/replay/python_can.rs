@@ -12,7 +12,7 @@ pub(super) const HEADER: &str = "timestamp,arbitration_id,extended";
 
 pub(super) struct Csv;
 
-/// A frame; `None` inside for CAN FD.
+/// A frame; `Some(None)` for CAN FD.
 fn event(fields: &[&str]) -> Option<Option<FrameOrFault>> {
     let [id, extended, remote, error, length, data] = fields else { return None };
     let flag = |text: &str| if text == "1" { Some(true) } else { (text == "0").then_some(false) };
@@ -58,7 +58,8 @@ fn base64(text: &str) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Seconds as Python writes them, `1700000000.25` or `1e-05`, to the microsecond: a float has no more.
+/// Seconds as Python writes them, `1700000000.25` or `1e-05`, rounded to the microsecond, which is the precision of a
+/// float.
 fn time(text: &str) -> Option<Wall> {
     let exponent =
         || text.contains('e').then(|| text.parse().ok())?.and_then(|it| Duration::try_from_secs_f64(it).ok());

@@ -1,4 +1,4 @@
-//! Recordings in all forms, and files that are none.
+//! Tests of recordings in all formats, and of other files.
 
 use super::*;
 use std::cell::RefCell;
@@ -177,7 +177,7 @@ fn all_formats_alike() {
             assert_eq!(events(leak(packed(&text))), expected, "packed {text}");
             assert_eq!(events(leak(text.clone().into_bytes())), expected, "{text}");
         }
-        // Cut off anywhere: fewer frames, never others. Only a log of candump does not show that data is missing.
+        // A cut-off file has fewer frames, never wrong ones. Only a log of candump does not show that data is missing.
         for length in 0..text.len() {
             let mut seen = all(&text[..length]);
             let end = seen.pop();
@@ -282,13 +282,13 @@ fn step_of_the_clock_takes_no_time_and_is_reported() {
     let by = Duration::from_secs(1_735_689_600 - 101);
     let noted = notes(log);
     assert!(noted.contains(&ReplayNote::ClockSet { count: 1, line: 3, by, is_backwards: false }), "{noted:?}");
-    // Set back twice. A frame that is a little too early is none.
+    // The clock is set back twice. A frame that is slightly too early does not count as a step.
     let log = "(1700000010.000000) can0 181#01\n(1700000009.995000) can0 181#02\n(1700000005.000000) can0 181#03\n\
                (1700000006.000000) can0 181#04\n(1700000001.000000) can0 181#05\n(1700000001.250000) can0 181#06\n";
     let times = ["0 181#01", "0 181#02", "0 181#03", "1000000 181#04", "1000000 181#05", "1250000 181#06", "end"];
     assert_eq!(all(log), times);
     let by = Duration::from_secs(5);
     assert_eq!(notes(log), [ReplayNote::ClockSet { count: 2, line: 3, by, is_backwards: true }]);
-    // A quiet weekend is a pause, hour for hour; the wall time goes with it.
+    // A quiet weekend is a pause, not a step of the clock.
     assert_eq!(notes("(1700000000.000000) can0 181#01\n(1700050000.000000) can0 181#02\n"), []);
 }

@@ -5,7 +5,7 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use std::time::Duration;
 
-/// Turns a date and time of a time zone, year to second, into seconds since 1970.
+/// Converts a date and time of a time zone, year to second, to seconds since 1970.
 pub(super) type TimeZone = fn([i32; 6]) -> Option<u64>;
 
 /// A frame, or the fault that an error frame reports.
@@ -14,7 +14,7 @@ pub(super) type FrameOrFault = Result<Frame, Fault>;
 /// The flag of an error frame in an identifier (`CAN_ERR_FLAG`).
 pub(super) const ERROR_FRAME: u32 = 0x2000_0000;
 
-/// Digits beyond these in a fraction are below a nanosecond, also of a day.
+/// Further digits of a fraction are below a nanosecond, even of a fraction of a day.
 const MAX_DIGITS: usize = 15;
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -41,7 +41,7 @@ pub(super) fn number(text: &str) -> Option<u64> {
     if text.bytes().all(|byte| byte.is_ascii_digit()) { text.parse().ok() } else { None }
 }
 
-/// `1059.9` or `1059` of a unit of time.
+/// `1059.9` or `1059` in a unit of time.
 pub(super) fn decimal(text: &str, unit: Duration) -> Option<Duration> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, "0"));
     let fraction = fraction.get(..fraction.len().min(MAX_DIGITS))?;
@@ -92,7 +92,7 @@ pub(super) fn date(text: &str, zone: TimeZone) -> Option<Duration> {
     Some(Duration::from_secs(zone(numbers)?) + fraction)
 }
 
-/// Takes a part of the day, month and year. Other words are names of the day.
+/// Parses a part of the day, month and year. Ignores other words, which are names of days.
 fn day(word: &str, fields: &mut [Option<i32>; 6]) {
     let numbers = |separator| word.split(separator).map(small).collect::<Vec<_>>();
     if let [Some(day), Some(month), Some(year)] = numbers('.')[..] {
@@ -118,7 +118,8 @@ pub(super) fn identifier(text: &str, base: u32, is_extended: bool) -> Option<Can
     if is_extended { CanId::extended(number) } else { CanId::standard(u16::try_from(number).ok()?) }
 }
 
-/// A data frame whose bytes are words in this number base. Hexadecimal bytes have two digits: one alone is cut off.
+/// A data frame whose bytes are words in this number base. Hexadecimal bytes have two digits; a single digit is cut
+/// off.
 pub(super) fn data_frame(id: CanId, length: usize, words: &[&str], base: u32) -> Option<Frame> {
     let words = words.get(..length)?;
     if base == 16 && words.iter().any(|word| word.len() != 2) {

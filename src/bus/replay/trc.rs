@@ -52,7 +52,7 @@ impl Trc {
     /// When the recording started, since 1970; zero if unknown.
     fn start(&mut self) -> Duration {
         let Some(clock) = self.clock.take() else { return *self.start.get_or_insert_default() };
-        // Ten digits of a day are 9 us, and more of them are as exact as a microsecond.
+        // Ten digits of a day resolve 9 us; further digits are rounded to the microsecond.
         let micros = (clock + Duration::from_nanos(500)).as_micros();
         let clock = Duration::from_micros(u64::try_from(micros).unwrap_or(u64::MAX));
         let (days, second) = (clock.as_secs() / DAY.as_secs(), clock.as_secs() % DAY.as_secs());
@@ -64,7 +64,7 @@ impl Trc {
         *self.start.insert(start)
     }
 
-    /// A frame or a state from the words of a line; `None` inside for another event.
+    /// A frame or a state from the words of a line; `Some(None)` for another event.
     fn event(&self, words: &[&str]) -> Option<Option<FrameOrFault>> {
         let column = |name| self.columns.find(name);
         let word = |name| column(name).and_then(|at| words.get(at).copied());
@@ -93,7 +93,7 @@ impl Trc {
     }
 }
 
-/// The columns of a version. Later ones have a line for them.
+/// The columns of a version. Later versions have a line with the columns.
 fn columns(version: &str) -> &'static str {
     match version {
         "1.1" => "NOTIlD",
@@ -153,7 +153,7 @@ mod tests {
                    1)  1  0185  4  D2 04 00 FF\n 2)  2  0705  1  RTR\n 3)  3  01890ABC  0\n 4)  4  0008  4  ERROR 00 19 08 08\n \
                    5)  5  FFFFFFFF  4  00 00 00 04  BUSLIGHT\n";
         assert_eq!(read(old), frames);
-        // Noon of the first day of the time zone.
+        // Noon of the first day in the test time zone.
         let trc = |version: &str, lines: &str| read(&format!(";$FILEVERSION={version}\n;$STARTTIME=36729.5\n{lines}"));
         let lines = "1) 1.2 Rx 0185 2 D2 04\n2) 2.3 Error 0008 4 00 19 08 08\n3) 3.4 Warng FFFFFFFF 4 00 00 00 10 BUSOFF\n\
                      4) 4.5 Tx 0705 1 RTR\n";

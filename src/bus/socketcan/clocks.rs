@@ -5,7 +5,7 @@ use std::time::Duration;
 
 /// How long a comparison of the clocks is valid. They drift apart by less than 1 ms in that time.
 const COMPARE_EVERY: Duration = Duration::from_secs(1);
-/// The largest distance of two readings for a good comparison.
+/// The longest time between two readings for a good comparison.
 const CLOSE: Duration = Duration::from_micros(100);
 /// The inaccuracy caused by successive readings and drift.
 const JITTER: Duration = Duration::from_millis(1);
@@ -14,12 +14,12 @@ const JITTER: Duration = Duration::from_millis(1);
 /// clocks are compared regularly, and the wall time of a frame is shifted by the difference.
 ///
 /// The wall clock may be set at any time. Then a frame seems to be received after it was read, or before the socket was
-/// last seen empty. The result always stays between these two moments.
+/// last found empty. The result is always between these two moments.
 #[derive(Debug, Default)]
 pub(super) struct Clocks {
     /// When the current batch was read.
     read: Mono,
-    /// When the socket was last seen empty before that.
+    /// When the socket was last found empty before this batch.
     empty_at: Mono,
     /// Whether the current batch left the socket empty.
     emptied: bool,
@@ -47,7 +47,7 @@ impl Clocks {
             return Stamp { mono: self.read, wall: Wall::at(start.saturating_add(self.read.since_start())) };
         };
         let mut mono = self.place(wall, start);
-        // Once per batch: a frame that still does not fit was received before the clock was set.
+        // Compare once per batch: if the time still does not fit, the frame was received before the clock was set.
         if mono.is_none() && self.compared.is_some_and(|(at, _)| at < self.read) {
             let start = self.compare(now);
             // After a send, the recorded read time is only an estimate.
@@ -58,7 +58,7 @@ impl Clocks {
     }
 
     fn compare(&mut self, now: &dyn Fn() -> Stamp) -> Duration {
-        // The wall clock was read between two readings of the other clock. If these are far apart, the program was
+        // The wall clock is read between two readings of the other clock. If these are far apart, the program was
         // interrupted, and the next try is better.
         let mut first = now();
         let mut best = (first, Duration::MAX);

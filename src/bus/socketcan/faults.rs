@@ -20,7 +20,7 @@ pub(super) fn faults(frame: CanErrorFrame) -> Vec<Fault> {
                 if problems.intersects(ControllerProblems::RX_OVERFLOW | ControllerProblems::TX_OVERFLOW) {
                     add(Fault::ControllerOverflow);
                 }
-                // The kernel may report a state for each direction. The worse one counts.
+                // The kernel may report a state for each direction. The worse state is reported.
                 if problems.intersects(ControllerProblems::RX_PASSIVE | ControllerProblems::TX_PASSIVE) {
                     add(Fault::ErrorPassive);
                 } else if problems.intersects(ControllerProblems::RX_WARNING | ControllerProblems::TX_WARNING) {
@@ -29,13 +29,13 @@ pub(super) fn faults(frame: CanErrorFrame) -> Vec<Fault> {
                     add(Fault::ErrorActive);
                 }
             }
-            // Some drivers report a missing acknowledge only by the location of the violation.
+            // Some drivers report a missing acknowledgement only by the location of the violation.
             ErrorCause::Protocol { location: Location::AckSlot, .. } | ErrorCause::NoAck => add(Fault::NoAcknowledge),
             ErrorCause::Protocol { .. } => add(Fault::Protocol),
             ErrorCause::Transceiver { .. } => add(Fault::Transceiver),
             ErrorCause::BusOff => add(Fault::BusOff),
             ErrorCause::Restarted => add(Fault::Restarted),
-            // This class only reports an error. Other classes in the frame name the error.
+            // This class only reports that there is an error. Other classes in the frame show which one.
             ErrorCause::BusError => {}
             _ => add(Fault::Other),
         }

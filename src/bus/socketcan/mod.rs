@@ -1,8 +1,8 @@
 //! Linux SocketCAN: kernel filters, timestamps of the interface or the kernel, the kernel's drop counter, error
 //! frames.
 //!
-//! A system call costs more than all other work for a frame. So one `recvmmsg` serves up to 64 calls of `receive`, the
-//! clock is read once for all of them, and the program waits for the socket only after the socket was found empty.
+//! A system call costs more than all other work for a frame. So one `recvmmsg` serves up to 64 calls of `receive`. The
+//! clock is read once for all of them. The program waits for the socket only after the socket was found empty.
 
 mod clocks;
 mod faults;
@@ -36,7 +36,7 @@ use std::time::{Duration, Instant};
 
 /// The interval of checks whether an interface is up again. The kernel does not report it.
 const LINK_CHECK: Duration = Duration::from_millis(200);
-/// The first wait after a send, without reading the clock or checking for signals. An answer within this time costs one
+/// The first wait after a send. It does not read the clock or check for signals. An answer within this time costs one
 /// system call instead of four.
 const ANSWER_TIME: Duration = Duration::from_millis(10);
 
@@ -51,7 +51,7 @@ pub struct SocketCan {
     own_clock: OwnClock,
     /// The time of the last frame that was processed.
     last_frame_at: Mono,
-    /// Whether the socket was found empty: wait before the next read.
+    /// Whether the socket was found empty. The next read then waits first.
     is_drained: bool,
     /// Whether a frame was sent since the last wait: an answer may come soon.
     has_sent: bool,
@@ -61,7 +61,7 @@ pub struct SocketCan {
     ready: VecDeque<Event>,
     /// Whether the interface is up, as last reported.
     is_up: bool,
-    /// Whether the interface was removed. Its socket is useless.
+    /// Whether the interface was removed. Its socket no longer works.
     is_removed: bool,
     /// The kernel's count of lost frames at the last report.
     reported_drops: u32,
@@ -70,7 +70,7 @@ pub struct SocketCan {
     /// The identifiers to deliver, if they are too many for the kernel.
     wanted: Option<BTreeSet<CanId>>,
     timestamps: TimestampSource,
-    /// The bit rate, read once while the interface stays up: that takes some system calls.
+    /// The bit rate, read once while the interface stays up, because this takes several system calls.
     bit_rate: Cell<Option<Option<u32>>>,
     /// The interface before its bit rate was set.
     original_link: Option<Link>,
@@ -84,7 +84,7 @@ impl SocketCan {
 
     /// Opens the CAN interface `name`, which may be down, for setting its bit rate.
     pub fn open_even_down(name: &str) -> Result<SocketCan, BusError> {
-        let mut bus = SocketCan::bound(name, &Filters::All)?;
+        let mut bus = SocketCan::bind(name, &Filters::All)?;
         match bus.socket.as_raw_socket().take_error() {
             Ok(None) => {}
             Ok(Some(error)) | Err(error) if error.raw_os_error() == Some(libc::ENETDOWN) => bus.is_up = false,
@@ -95,7 +95,7 @@ impl SocketCan {
 
     /// Opens the CAN interface `name` with filters that apply from the first frame on.
     pub fn open_filtered(name: &str, filters: &Filters) -> Result<SocketCan, BusError> {
-        let bus = SocketCan::bound(name, filters)?;
+        let bus = SocketCan::bind(name, filters)?;
         // Binding to an interface that is down succeeds and leaves the error on the socket.
         match bus.socket.as_raw_socket().take_error() {
             Ok(Some(error)) | Err(error) => Err(bus.error("open", error)),
@@ -103,7 +103,7 @@ impl SocketCan {
         }
     }
 
-    fn bound(name: &str, filters: &Filters) -> Result<SocketCan, BusError> {
+    fn bind(name: &str, filters: &Filters) -> Result<SocketCan, BusError> {
         let interrupts =
             Interrupts::new().map_err(|source| BusError::Io { what: "watch for signals".into(), source })?;
         let Bound { socket, wanted, timestamps } = socket::bind(name, filters, ANSWER_TIME)?;
@@ -157,7 +157,7 @@ impl SocketCan {
         let (batch, ready, socket) = (&mut self.batch, &mut self.ready, self.socket.as_fd());
         let result = work(&self.name, &mut || {
             ready.clear();
-            // Read all frames, then the error that the interface is down, which comes once.
+            // Read all frames first, then the error "interface is down", which comes only once.
             while batch.fill(socket, false).is_ok() {}
             while batch.fill(socket, false).is_ok() {}
         });
@@ -176,7 +176,7 @@ impl SocketCan {
             Ok(count) => {
                 self.is_drained = count < receive::BATCH;
                 if wait {
-                    // The frames are usually not later than this. If one is, the clocks are compared again.
+                    // An upper estimate of the receive time. A later frame causes a new comparison of the clocks.
                     self.clocks.batch(self.last_clock_reading.get() + ANSWER_TIME + ANSWER_TIME, false);
                 } else {
                     self.clocks.batch(self.mono(), self.is_drained);
@@ -189,7 +189,7 @@ impl SocketCan {
                     Ok(())
                 }
                 Some(libc::EINTR) => Ok(()),
-                // The kernel reports this once. The socket stays bound and works again with the interface.
+                // The kernel reports this once. The socket stays bound and works again when the interface is up.
                 Some(libc::ENETDOWN) => {
                     self.set_is_up(false);
                     Ok(())
@@ -237,15 +237,14 @@ impl SocketCan {
         self.set_is_up(false);
     }
 
-    /// Opens the interface again after it was removed, if one with its name exists: an adapter was unplugged and
-    /// plugged in again.
+    /// Reopens the interface after an adapter was unplugged and plugged in again.
     ///
     /// # Errors
     /// The interface exists but cannot be opened.
     fn find_again(&mut self) -> Result<(), BusError> {
         let bound = match socket::bind(&self.name, &self.filters, ANSWER_TIME) {
             Ok(bound) => bound,
-            // Not ready yet: the interface is created, renamed and set up step by step.
+            // The interface is not ready yet: it is created, renamed and set up in steps.
             Err(BusError::NoInterface(_) | BusError::NotCan(_)) => return Ok(()),
             Err(error) => return Err(error),
         };
@@ -256,7 +255,7 @@ impl SocketCan {
         (self.socket, self.wanted, self.timestamps) = (bound.socket, bound.wanted, bound.timestamps);
         (self.is_removed, self.reported_drops, self.is_drained) = (false, 0, false);
         self.own_clock = OwnClock::default();
-        // If the interface is down, that is the first error of the socket.
+        // If the interface is down, the socket reports this as its first error.
         match self.socket.as_raw_socket().take_error() {
             Ok(None) => self.set_is_up(true),
             Ok(Some(error)) | Err(error) => match error.raw_os_error() {
@@ -270,8 +269,8 @@ impl SocketCan {
 
     /// Processes a message. Returns its frame if no other event comes first; otherwise all events are queued in order.
     fn process(&mut self, message: Message) -> Option<Event> {
-        // A received frame may show that the interface is up, earlier than the next check. Frames from before it went
-        // down arrive as well.
+        // A received frame may show that the interface is up, earlier than the next check. Old frames, queued before
+        // the interface went down, also arrive here. So the state is checked.
         if self.is_back() {
             self.set_is_up(true);
         }
@@ -406,7 +405,7 @@ impl Bus for SocketCan {
                     None => has_discarded = true,
                 }
             } else if has_discarded && self.last_frame_at > deadline {
-                // Discarded frames must not delay the deadline.
+                // Frames that are filtered out must not extend the deadline.
                 return Ok(Event::Timeout);
             } else if !self.is_drained {
                 self.fill(false)?;

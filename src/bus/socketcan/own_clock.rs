@@ -10,15 +10,16 @@ const DRIFT: i128 = 600;
 /// or restarted.
 const LATENCY: Duration = Duration::from_millis(50);
 
-/// Some drivers report when the interface received a frame, by its own clock. That clock is not delayed by a busy host,
-/// so it gives better intervals than the kernel. But it starts at any value, drifts, and is never set.
+/// Some drivers report the receive time of a frame by the clock of the interface. A busy host does not delay this
+/// clock, so its intervals are better than those of the kernel. But the clock starts at any value, drifts, and is never
+/// set.
 ///
-/// The kernel never has a frame before it was on the bus. So the smallest difference between the two times is the
-/// offset of the clocks. It may grow only as fast as they can drift. The result is never later than the time of the
-/// kernel, never earlier by more than [`LATENCY`], and never goes backwards.
+/// The kernel receives a frame only after the interface. So the smallest difference between the two times is the offset
+/// of the clocks. The offset may grow only as fast as the clocks can drift. The result is never later than the time of
+/// the kernel, never earlier by more than [`LATENCY`], and never goes backwards.
 #[derive(Debug, Default)]
 pub(super) struct OwnClock {
-    /// The last reading, and how far the host clock was ahead of it, in nanoseconds.
+    /// The last reading, and the offset of the host clock from it, in nanoseconds.
     known: Option<(i128, i128)>,
     /// When the last frame was received.
     last: Mono,
@@ -44,7 +45,7 @@ impl OwnClock {
         Stamp { mono, wall: Wall::at(wall) }
     }
 
-    /// Records a frame with only a kernel time: no later frame gets an earlier time.
+    /// Records a frame with only a kernel time, so that no later frame gets an earlier time.
     pub(super) fn pass(&mut self, kernel: Stamp) {
         self.last = kernel.mono;
     }
@@ -74,7 +75,7 @@ mod tests {
         if noise.is_multiple_of(50) { us(20_000) } else { us(100 + noise % 2000) }
     }
 
-    /// The reading of a clock that is wrong by this many parts per million.
+    /// The reading of a clock with a deviation of this many parts per million.
     fn shown(length: Duration, wrong: i32) -> Duration {
         let by = length * wrong.unsigned_abs() / 1_000_000;
         if wrong < 0 { length - by } else { length + by }

@@ -37,7 +37,7 @@ pub(super) struct Message {
     pub(super) wall: Option<Duration>,
     /// When the interface received it, by its own clock.
     pub(super) own: Option<Duration>,
-    /// The total number of frames that this socket had lost when this one was queued.
+    /// The total number of frames lost by this socket when this frame was queued.
     pub(super) lost: Option<u32>,
 }
 
@@ -60,7 +60,7 @@ impl Batch {
         while self.next < self.count {
             let slot = &self.slots[self.next];
             self.next += 1;
-            // Another length is not a classic frame. The socket does not request such frames.
+            // A frame of another length is not a classic frame. The socket does not request such frames.
             if slot.filled == size_of::<libc::can_frame>() {
                 let info = parse_control(&slot.control.0[..slot.control_filled.min(CONTROL)]);
                 return Some(Message { frame: slot.frame, wall: info.wall, own: info.own, lost: info.lost });

@@ -67,7 +67,7 @@ pub fn bring_down(name: &str) -> Result<Change, BusError> {
 /// Checks whether this process can set the bit rate of the interface.
 ///
 /// # Errors
-/// It is not a controller, or the privilege is missing.
+/// The interface is not a controller, or the privilege is missing.
 pub(super) fn can_set_bit_rate(name: &str) -> Result<(), BusError> {
     is_controller(name, &link(name)?)?;
     // If the privilege is unknown, the kernel decides later.
@@ -77,10 +77,10 @@ pub(super) fn can_set_bit_rate(name: &str) -> Result<(), BusError> {
     Ok(())
 }
 
-/// Sets bit rate and mode of an interface and switches it on. `while_down` is called while it is down.
+/// Sets bit rate and mode of an interface and switches it on. `while_down` is called while the interface is down.
 ///
 /// # Errors
-/// The kernel rejects the change. The interface is then restored, or the error reports that it is not.
+/// The kernel rejects the change. The interface is then restored; if not, the error reports it.
 pub(super) fn retime(
     name: &str,
     before: &Link,

@@ -10,8 +10,8 @@ use std::time::Duration;
 
 /// The largest number of filters that the kernel accepts (`CAN_RAW_FILTER_MAX`).
 const MAX_FILTERS: usize = 512;
-/// The requested receive buffer in bytes; the kernel doubles it. A frame takes about 800 bytes: this holds 40,000
-/// frames, five seconds of a full bus at 1 Mbit/s.
+/// The requested receive buffer in bytes; the kernel doubles it. A frame takes about 800 bytes, so the buffer holds
+/// 40,000 frames: five seconds of a full bus at 1 Mbit/s.
 const RECEIVE_BUFFER: i32 = 16 << 20;
 
 /// A socket that is bound to an interface.
@@ -23,8 +23,8 @@ pub(super) struct Bound {
     pub(super) timestamps: TimestampSource,
 }
 
-/// Opens a socket on the interface `name` that blocks for at most `limit`. If the interface is down, that is left as
-/// the error of the socket.
+/// Opens a socket on the interface `name` that blocks for at most `limit`. If the interface is down, this is the error
+/// of the socket.
 pub(super) fn bind(name: &str, filters: &Filters, limit: Duration) -> Result<Bound, BusError> {
     let socket = new(limit)?;
     let failed = |what: &str, source| BusError::Io { what: format!("{what} {name}"), source };
@@ -67,7 +67,7 @@ fn new(limit: Duration) -> Result<CanSocket, BusError> {
     }
 }
 
-/// Sets the filters of the kernel. Returns the identifiers if they are too many for it.
+/// Sets the filters of the kernel. Returns the identifiers if they are too many for the kernel.
 pub(super) fn set_filters(socket: &CanSocket, filters: &Filters) -> io::Result<Option<BTreeSet<CanId>>> {
     let ids: BTreeSet<CanId> = match filters {
         Filters::All => return socket.set_filter_accept_all().map(|()| None),
@@ -108,7 +108,7 @@ pub(super) fn lost(socket: &CanSocket) -> Option<u32> {
 /// Reads `SO_MEMINFO`: the memory use of a socket and its drops. The kernel decides the number of values.
 #[expect(unsafe_code, reason = "neither socket2 nor the socketcan crate reads SO_MEMINFO")]
 fn read_memory_info(socket: BorrowedFd<'_>) -> io::Result<Vec<u32>> {
-    /// `SO_MEMINFO` of linux/socket.h; libc names it on some architectures only.
+    /// `SO_MEMINFO` of linux/socket.h; libc defines it only on some architectures.
     const SO_MEMINFO: libc::c_int = 55;
     let mut numbers = [0u32; 16];
     let mut length = libc::socklen_t::try_from(size_of_val(&numbers)).unwrap_or(0);

@@ -61,13 +61,13 @@ impl LssAddress {
         self.parts()[usize::from(part.number())]
     }
 
-    /// The frames that select it, in order.
+    /// The frames that select the slave with this address, in order.
     pub fn selection(&self) -> [Request; 4] {
         Part::ALL.map(|part| Request::Select(part, self.part(part)))
     }
 
-    /// The ranges with its vendor and product and a lower, or a higher, serial number, for all revisions. `None` if
-    /// there is no lower or higher number.
+    /// Two ranges of the same vendor and product: all lower and all higher serial numbers, in all revisions. `None` if
+    /// no lower or no higher number exists.
     pub fn neighbours(&self) -> [Option<LssRange>; 2] {
         let range = |serial| LssRange { vendor: self.vendor, product: self.product, revision: (0, u32::MAX), serial };
         [
@@ -76,7 +76,7 @@ impl LssAddress {
         ]
     }
 
-    /// The ranges with its serial number, vendor and product and another revision.
+    /// Two ranges of the same vendor, product and serial number: all lower and all higher revisions.
     pub fn revisions(&self) -> [Option<LssRange>; 2] {
         let range = |revision| LssRange { revision, ..LssRange::from(*self) };
         [
@@ -87,7 +87,7 @@ impl LssAddress {
 }
 
 impl LssRange {
-    /// The frames that ask for it, in order.
+    /// The frames of the identify request, in order.
     pub fn identification(&self) -> [Request; 6] {
         Limit::ALL.map(|limit| {
             let number = match limit {
@@ -220,7 +220,7 @@ mod tests {
                 prop_assert!(range.contains(&address));
             }
 
-    /// Together, the neighbours and the other revisions contain each other address once, and not the address itself.
+    /// Together, `neighbours` and `revisions` contain every other address once, but not the address itself.
             #[test]
     fn ranges_cover_all_other_addresses(revision in 0u32..4, serial in 0u32..4, other in (0u32..4, 0u32..4)) {
                 let address = LssAddress { vendor: 1, product: 2, revision, serial };

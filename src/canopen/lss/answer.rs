@@ -7,7 +7,7 @@ use crate::canopen::id::{CanId, NodeId};
 /// An answer of a slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// 44h: the slave is in configuration state. Some manuals show a mode in the next byte, others 0.
+    /// 44h: the slave is in configuration state. The next byte is a mode in some manuals, 0 in others.
     Selected,
     /// 11h, 13h, 17h: accepted or rejected.
     Acknowledge(ErrorCode),
@@ -31,11 +31,11 @@ pub enum Violation {
 }
 
 impl Answer {
-    /// Parses an answer to `service`; `None` if the frame is something else.
+    /// Parses an answer to `service`; `None` if the frame does not answer it.
     ///
     /// # Errors
-    /// The frame answers this service, but required bytes are missing or invalid. Unused bytes may be missing: some
-    /// devices send two bytes instead of eight.
+    /// Required bytes are missing or invalid. Unused bytes may be missing: some devices send two bytes instead of
+    /// eight.
     pub fn parse(frame: &Frame, service: Service) -> Option<Result<Answer, Violation>> {
         let (&specifier, rest) = frame.data().split_first()?;
         if frame.id() != CanId::LSS_SLAVE || service.answer_specifier() != Some(specifier) {

@@ -3,12 +3,12 @@
 use super::Service;
 use std::fmt;
 
-/// The two bytes of an acknowledge. 0 is success; FFh means that the manufacturer-specific code counts.
+/// The two bytes of an acknowledgement. 0 means success; FFh means that the manufacturer-specific code is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ErrorCode {
     /// The error code, whose meaning depends on the service.
     pub code: u8,
-    /// The manufacturer-specific code. It counts if `code` is FFh.
+    /// The manufacturer-specific code, used if `code` is FFh.
     pub specific: u8,
 }
 
@@ -34,7 +34,7 @@ impl ErrorCode {
         })
     }
 
-    /// The code in words: `error 1, node-ID out of range`, `error 255, manufacturer-specific error: 3`.
+    /// The code as text: `error 1, node-ID out of range`, `error 255, manufacturer-specific error: 3`.
     pub fn describe(self, service: Service) -> impl fmt::Display {
         Description { code: self, service }
     }

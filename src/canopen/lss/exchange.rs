@@ -6,8 +6,8 @@ use crate::canopen::frame::Frame;
 /// The number of different answers that are kept.
 const KEPT: usize = 128;
 
-/// A service in progress. It collects answers until the caller ends it, because all slaves in configuration state
-/// answer.
+/// A service in progress. All slaves in configuration state answer, so the exchange collects answers until the caller
+/// ends it.
 #[derive(Clone, Debug)]
 pub struct Exchange {
     requests: Vec<Request>,
@@ -81,8 +81,8 @@ impl Exchange {
         self.count > 0
     }
 
-    /// Whether more than one slave answered: the answers differ, or there were more answers than requests. The number
-    /// does not count for a service that all slaves answer with the same frame.
+    /// Whether more than one slave answered: the answers differ, or there were more answers than requests. If all
+    /// slaves answer the service with the same frame, only different answers count.
     pub fn is_crowded(&self) -> bool {
         self.heard.len() > 1 || self.count > self.asked
     }
@@ -92,8 +92,8 @@ impl Exchange {
         &self.heard
     }
 
-    /// The result if one slave is addressed. If all slaves send the same frame ([`Service::has_common_answer`]), several
-    /// answers count as one.
+    /// The result of a service for one slave. If all slaves send the same frame ([`Service::has_common_answer`]),
+    /// several answers count as one.
     ///
     /// # Errors
     /// No answer, several slaves, a rejection, or a protocol violation.

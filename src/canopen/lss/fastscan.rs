@@ -1,12 +1,12 @@
 //! Fastscan: the address of a slave without a node-ID, bit by bit (CiA 305, 7.5.3.5).
 //!
-//! Each step asks whether a slave has a number with these upper bits. An answer means yes, no answer means no. So a
-//! late answer gives two wrong results. Therefore the found bits are checked after every eight bits, and again before
-//! the next number. If a check fails, the eight bits are searched again with a longer time-out, and after that the
-//! whole number.
+//! Each step asks whether a slave has a number with these upper bits. An answer means yes, no answer means no. A late
+//! answer therefore gives two wrong results. So the found bits are checked after every eight bits, and before the next
+//! number. If a check fails, the eight bits are searched again with a longer time-out. If it fails again, the whole
+//! number is searched again.
 //!
-//! Several slaves may answer one step one after the other. The second answer must not count for the next step. As soon
-//! as a step got more than one answer, each step waits until its time-out.
+//! Several slaves may answer one step, one after the other. The second answer must not count for the next step. So
+//! after the first step with two answers, each step waits until its time-out.
 
 use super::{LssAddress, Part, Request};
 use crate::canopen::frame::Frame;
@@ -14,7 +14,7 @@ use crate::canopen::frame::Frame;
 /// The number of failed checks that are allowed for one number.
 const TRIES: u8 = 6;
 
-/// How many answers to the impossible probe are needed for an error. A single one may be a late answer.
+/// The number of answers to the impossible probe that is an error. A single one may be a late answer.
 const PROBES: u8 = 3;
 
 /// The number of bits between two checks.
@@ -93,7 +93,7 @@ enum Phase {
     Probe,
     /// The bit, 31 to 0.
     Bit(u8),
-    /// Checks the number found down to this bit. Slaves do not change their state.
+    /// Checks the bits found so far, down to this one. Slaves do not change their state.
     Check(u8),
     /// Checks the complete number. A matching slave compares the next part; after the last part it is in configuration
     /// state.

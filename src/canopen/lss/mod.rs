@@ -1,6 +1,7 @@
 //! LSS: node-ID and bit rate over the bus (CiA 305). The master side, as pure state machines.
 //!
-//! A state machine returns the frames to send. The caller passes received frames and time-outs. It never waits.
+//! A state machine returns the frames to send. The caller passes received frames and time-outs. A state machine never
+//! waits.
 
 mod address;
 mod answer;

@@ -87,8 +87,7 @@ impl Service {
         })
     }
 
-    /// Whether all addressed slaves answer with the same frame. Then two frames do not prove two
-    /// slaves, and one frame does not prove a single one.
+    /// Whether all addressed slaves answer with the same frame. The number of answers is then not the number of slaves.
     pub fn has_common_answer(self) -> bool {
         matches!(self, Service::Identify | Service::IdentifyUnconfigured | Service::Fastscan)
     }
@@ -204,7 +203,7 @@ impl Request {
         }
     }
 
-    /// The frame: always eight bytes, unused ones are 0.
+    /// The frame: always eight bytes; unused bytes are 0.
     pub fn frame(self) -> Frame {
         let with_number = |specifier: u8, number: u32| {
             let [a, b, c, d] = number.to_le_bytes();
@@ -230,8 +229,8 @@ impl Request {
         Frame::full(CanId::LSS_MASTER, data)
     }
 
-    /// Parses a frame of a master; `None` if it is not one, is too short, or contains a number that the standard does
-    /// not define.
+    /// Parses a frame of a master; `None` for other frames, short frames, and numbers that the standard does not
+    /// define.
     pub fn parse(frame: &Frame) -> Option<Request> {
         if frame.id() != CanId::LSS_MASTER {
             return None;

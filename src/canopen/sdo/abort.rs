@@ -134,7 +134,7 @@ mod tests {
         words.sort_unstable();
         words.dedup();
         assert_eq!(words.len(), codes.len());
-        // Many programs copied a wrong table (0606_0010 …). It is not that of the standard.
+        // Many programs contain a wrong table (0606_0010 …), which differs from the standard.
         assert_eq!(AbortCode(0x0606_0010).to_string(), "0x06060010");
         assert_eq!(AbortCode(0x0602_0000).to_string(), "0x06020000, the object does not exist");
     }

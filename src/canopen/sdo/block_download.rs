@@ -24,9 +24,9 @@ pub struct BlockDownload {
     state: State,
     /// Whether the server checks a CRC.
     crc: bool,
-    /// Blocks in a row of which the server accepted nothing.
+    /// Consecutive blocks of which the server accepted nothing.
     setbacks: u8,
-    /// The acknowledge of the previous block.
+    /// The acknowledgement of the previous block.
     acknowledge: Option<Frame>,
 }
 
@@ -79,8 +79,8 @@ impl BlockDownload {
         }
     }
 
-    /// One of the frames was sent. A server never acknowledges unsent segments, so a repeated acknowledge of the
-    /// previous block can be recognised.
+    /// One of the frames was sent. A server never acknowledges unsent segments. So the number of sent segments
+    /// identifies a repeated acknowledgement of the previous block.
     pub fn on_sent(&mut self) {
         if let State::SubBlock { count, sent, .. } = &mut self.state {
             *sent = (*count).min(*sent + 1);
@@ -119,8 +119,8 @@ impl BlockDownload {
         TransferError::NoAnswer
     }
 
-    /// Aborts the transfer, even if the request was not answered: the answer may be lost, and a server in a block
-    /// transfer treats all further frames as part of it.
+    /// Aborts the transfer, even if the request was not answered. The answer may be lost, and the server would treat
+    /// all further frames as part of the block transfer.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
         out.push(abort_frame(self.node, self.object, code));
     }

@@ -1,9 +1,9 @@
 //! SDO block upload: the client reads an object in sub-blocks of up to 127 segments, each acknowledged as a
 //! whole (CiA 301, 7.2.4.3.12 to 7.2.4.3.15).
 //!
-//! Segments are accepted only in order. After a lost segment, the acknowledge names the last one before it, and the
-//! server repeats the rest. After a time-out the position of the server is uncertain. Then the result must be proved by
-//! the CRC or the announced size; without either, the transfer fails.
+//! Segments are accepted only in order. After a lost segment, the acknowledgement contains the number of the last
+//! segment before it, and the server repeats the rest. After a time-out the position of the server is uncertain. Then
+//! the CRC or the announced size must confirm the data; without both, the transfer fails.
 
 use super::crc::crc16;
 use super::{
@@ -28,13 +28,13 @@ pub struct BlockUpload {
     crc: bool,
     /// The number of bytes missing in the frame of the last segment.
     missing: usize,
-    /// Blocks in a row without progress or without an end.
+    /// Consecutive blocks without progress or without an end.
     setbacks: u8,
     /// Whether segments were repeated.
     disturbed: bool,
-    /// The object cannot be longer, in bytes.
+    /// The limit for the size of the object in bytes.
     limit: usize,
-    /// Used if the server answers as to a segmented upload.
+    /// Used if the server answers with an expedited or segmented upload.
     plain: Upload,
 }
 
@@ -48,21 +48,21 @@ enum State {
         taken: u8,
         /// The highest sequence number seen.
         highest: u8,
-        /// The previous acknowledge; 0 before the first block.
+        /// The previously acknowledged segment; 0 before the first block.
         acknowledged: u8,
-        /// The frame that ended the previous block. Repeated, it ends nothing.
+        /// The frame that ended the previous block. A repetition of this frame is ignored.
         closing: Option<Frame>,
     },
-    /// All is acknowledged; the end frame is expected. `closing` is the frame of the last segment.
+    /// All segments are acknowledged; the end frame is expected. `closing` is the frame of the last segment.
     Acknowledged {
         closing: Frame,
     },
 }
 
 impl BlockUpload {
-    /// An upload of `object` from `node`. With a `threshold` ("protocol switch threshold" of the standard, 0 for none)
-    /// the server may answer expedited or segmented if the object is not larger, in bytes. For `accept_60` see
-    /// [`Upload::new`].
+    /// An upload of `object` from `node`.
+    /// `threshold` is the "protocol switch threshold" of the standard, 0 for none. If the object has at most this many bytes, the server may answer expedited or segmented. For `accept_60`
+    /// see [`Upload::new`].
     pub fn new(node: NodeId, object: ObjectId, threshold: u8, accept_60: bool) -> BlockUpload {
         BlockUpload {
             node,
@@ -121,8 +121,8 @@ impl BlockUpload {
         if self.state == State::Plain { self.plain.received() } else { (self.bytes.len(), self.announced) }
     }
 
-    /// Handles a received frame. Frames to send go to `out`. An accepted segment returns [`Progress::Continue`] with
-    /// nothing to send; the time-out restarts.
+    /// Handles a received frame. Frames to send go to `out`. For an accepted segment, returns [`Progress::Continue`]
+    /// without a frame to send; the time-out restarts.
     pub fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
         if self.state == State::Plain {
             return self.plain.on_frame(frame, out);
@@ -144,12 +144,12 @@ impl BlockUpload {
         }
     }
 
-    /// Handles a time-out. Within a block, the received segments are acknowledged, so that the server repeats the rest;
-    /// `None` means that the transfer continues. Otherwise it is aborted.
+    /// Handles a time-out. Within a block, acknowledges the received segments, so that the server repeats the rest.
+    /// Otherwise aborts the transfer. `None` means that the transfer continues.
     pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> Option<TransferError> {
         if let State::SubBlock { taken, acknowledged, .. } = self.state {
-            // Without any segment, the block or the previous acknowledge was lost. The position of the server is known
-            // only if both cases are equal: after an acknowledge of nothing.
+            // If no segment came, either the block or the previous acknowledgement was lost. The position of the server
+            // is the same in both cases only if the previous acknowledgement was 0.
             let unambiguous = taken > 0 || acknowledged == 0;
             let provable = self.crc || self.announced.is_some();
             if unambiguous && provable && self.setbacks < MAX_STALLED_BLOCKS {
@@ -163,8 +163,8 @@ impl BlockUpload {
         Some(TransferError::NoAnswer)
     }
 
-    /// Aborts the transfer, even if the request was not answered: the answer may be lost, and a server in a block
-    /// transfer treats all further frames as part of it.
+    /// Aborts the transfer, even if the request was not answered. The answer may be lost, and the server would treat
+    /// all further frames as part of the block transfer.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
         out.push(abort_frame(self.node, self.object, code));
     }
@@ -244,7 +244,7 @@ impl BlockUpload {
         self.send(0xa2, taken, self.block_size.get(), out);
     }
 
-    /// Whether this is the end frame of an object of 0 bytes, from a server that sends no empty segment before it.
+    /// Whether this is the end frame of an object of 0 bytes. Some servers omit the empty segment before it.
     fn is_end_of_nothing(&self, head: u8, frame: &Frame) -> bool {
         let is_empty = self.announced == Some(0) || self.announced.is_none() && self.crc;
         is_empty && head & 0xe1 == 0xc1 && frame.data()[1..].iter().all(|&byte| byte == 0)
@@ -257,8 +257,8 @@ impl BlockUpload {
         let length = if misnamed { self.bytes.len() } else { self.bytes.len().saturating_sub(unused) };
         let expected = if self.crc { crc16(&self.bytes[..length]) } else { 0 };
         let [low, high] = expected.to_le_bytes();
-        // Segment 65, if it is the last, starts like an end frame. A repeated one is not an end frame, unless it
-        // has the expected contents.
+        // If segment 65 is the last one, it starts like an end frame. Its repetition is not an end frame, unless it has
+        // the expected contents.
         if closing == Some(*frame) && data != [head, low, high, 0, 0, 0, 0, 0] {
             return Progress::NotOurs;
         }
@@ -272,7 +272,7 @@ impl BlockUpload {
                 _ => return self.fail(Violation::Short, frame, out),
             }
         }
-        // The CRC does not depend on the number of leading zeros.
+        // The CRC does not detect missing leading zeros.
         if self.disturbed && self.announced.is_some_and(|size| usize::try_from(size) != Ok(length)) {
             return self.fail(Violation::Size, frame, out);
         }
@@ -282,8 +282,8 @@ impl BlockUpload {
         Progress::Done(Uploaded { announced: self.announced, has_wrong_end: misnamed, ..Uploaded::complete(bytes) })
     }
 
-    /// Whether an end frame wrongly declares the whole last segment invalid: the announced size and the CRC
-    /// both include it. durand 0.5.0 does that for objects of a multiple of seven bytes.
+    /// Whether an end frame wrongly declares the whole last segment invalid, although the announced size and the CRC
+    /// include it. durand 0.5.0 does this if the size is a multiple of seven bytes.
     fn is_full_by_proof(&self, unused: usize, end: &[u8]) -> bool {
         let announced = self.announced.is_some_and(|size| usize::try_from(size) == Ok(self.bytes.len()));
         let given = matches!(end, [_, low, high, ..] if u16::from_le_bytes([*low, *high]) == crc16(&self.bytes));

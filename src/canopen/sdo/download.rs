@@ -8,10 +8,10 @@ use crate::canopen::object::ObjectId;
 /// Whether a download indicates its size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DownloadSize {
-    /// 2Fh, 2Bh, 27h, 23h, 21h.
+    /// The size is indicated: 2Fh, 2Bh, 27h, 23h, 21h.
     #[default]
     Indicated,
-    /// 22h, 20h: the form in the manuals of D-20-9 and DPS.
+    /// The size is not indicated: 22h, 20h. The manuals of D-20-9 and DPS show this form.
     Omitted,
 }
 
@@ -28,7 +28,7 @@ pub struct Download {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Initiated,
-    /// A segment was sent: the bytes before `end` are sent, and the acknowledge with `toggle` is expected.
+    /// A segment was sent. The bytes before `end` are sent, and the acknowledgement with `toggle` is expected.
     Segment {
         end: usize,
         toggle: bool,
@@ -36,8 +36,8 @@ enum State {
 }
 
 impl Download {
-    /// A download of `data` to `object` of `node`. One to four bytes are expedited, other sizes segmented (also 0,
-    /// which an expedited transfer cannot indicate).
+    /// A download of `data` to `object` of `node`. One to four bytes are sent expedited, other sizes segmented. An
+    /// expedited transfer cannot indicate 0 bytes.
     pub fn new(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Download {
         Download { node, object, data, size, state: State::Initiated }
     }

@@ -1,6 +1,6 @@
 //! The size rule: from the delivered bytes to a value of the expected type.
 //!
-//! It is never stricter than sensors in the field, and always reports a deviation.
+//! Deviations of real sensors are accepted, and each one is reported.
 
 use super::Uploaded;
 use crate::canopen::frame::Frame;
@@ -44,7 +44,7 @@ pub enum Note {
     },
     /// A segment before the last one was not full, twice in the same way.
     ShortSegment,
-    /// The end frame of a block transfer declares the last segment invalid; size and CRC include it.
+    /// The end frame of a block transfer declares the last segment invalid, but size and CRC include the segment.
     WrongEnd,
 }
 
@@ -78,16 +78,16 @@ pub enum FitError {
         /// Bytes delivered.
         found: usize,
     },
-    /// An expedited answer has fewer bytes than it declares, and the type needs the missing ones or is unknown.
+    /// An expedited answer has fewer bytes than it declares, and the type needs the missing bytes or is unknown.
     #[error("the frame has fewer bytes than it declares: {0}")]
     Truncated(Frame),
 }
 
 /// Converts delivered bytes to `data_type`; with `None` the bytes stay as they are.
 ///
-/// If no size is indicated, the width of the type decides and further bytes are ignored. If a size is indicated, more
-/// bytes than the type has are accepted if the excess is zero or the sign of a negative integer. An integer in fewer
-/// bytes has the same value, unless the length contradicts the announced one.
+/// If no size is indicated, further bytes than those of the type are ignored. If a size is indicated, further bytes
+/// must be zero or the sign of a negative integer. An integer may have fewer bytes than its type, unless the length
+/// differs from the announced one.
 ///
 /// # Errors
 /// The bytes do not fit the type.
@@ -185,7 +185,7 @@ mod tests {
         let answer = Uploaded { announced: Some(9), ..Uploaded::complete(b"MH-4-CAN".to_vec()) };
         let note = Some(Note::Announced { announced: 9, found: 8 });
         assert_eq!(text(DataType::VisibleString, &answer), Ok(("MH-4-CAN".into(), note)));
-        // A number with missing bytes is another number.
+        // A number with missing bytes would be wrong.
         let answer = Uploaded { announced: Some(4), ..Uploaded::complete(vec![0xfe, 0xff]) };
         assert!(text(DataType::Integer(4), &answer).is_err());
         assert!(text(DataType::Integer(2), &answer).is_ok());

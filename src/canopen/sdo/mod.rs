@@ -1,7 +1,7 @@
 //! SDO client: transfers as pure state machines (CiA 301, 7.2.4).
 //!
-//! The caller passes received frames and time-outs to a state machine. It returns whether a frame belongs to the
-//! transfer, what to send next, and how the transfer ended. It never waits.
+//! The caller passes received frames and time-outs to a state machine. The state machine reports whether a frame
+//! belongs to the transfer, the next frames to send, and the end of the transfer. It never waits.
 
 mod abort;
 mod block_download;
@@ -64,7 +64,7 @@ pub enum TransferError {
 /// How an answer to our transfer violates the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Violation {
-    /// Command specifier 60h, the acknowledge of a download, in answer to an upload.
+    /// Command specifier 60h, the acknowledgement of a download, in answer to an upload.
     #[error("acknowledge of a write (60h) in answer to a read")]
     WriteAcknowledgeToRead,
     /// The command specifier does not answer this request.
@@ -82,7 +82,7 @@ pub enum Violation {
     /// The block size is not in 1 to 127.
     #[error("invalid block size")]
     BlockSize,
-    /// An acknowledge of segments that were not sent.
+    /// An acknowledgement of segments that were not sent.
     #[error("acknowledge of segments that were not sent")]
     Sequence,
     /// Several blocks in a row without any received segment.
@@ -96,7 +96,7 @@ pub enum Violation {
     Size,
 }
 
-/// The number of blocks in a row without progress after which a block transfer is aborted.
+/// A block transfer is aborted after this number of consecutive blocks without progress.
 const MAX_STALLED_BLOCKS: u8 = 3;
 
 impl Violation {
@@ -140,8 +140,8 @@ fn number(data: &[u8]) -> Option<u32> {
 
 /// The abort code of a frame that aborts the transfer of `object`. A truncated code reads as 0.
 ///
-/// An abort with the identifier of the request counts too. The D-20-9 manual (page 7) shows it there, and an abort of
-/// another master also ends the transfer.
+/// An abort with the identifier of the request counts, too. The D-20-9 manual (page 7) shows such an abort, and an
+/// abort of another master also ends the transfer.
 fn abort_of(frame: &Frame, node: NodeId, object: ObjectId) -> Option<AbortCode> {
     let here = frame.id() == CanId::sdo_response(node) || frame.id() == CanId::sdo_request(node);
     let data = frame.data();

@@ -21,7 +21,8 @@ pub struct Uploaded {
     pub has_short_segment: bool,
     /// The expedited answer, if it has fewer bytes than it declares. The missing bytes are never filled.
     pub truncated: Option<Frame>,
-    /// Whether the end frame of a block transfer declared a segment invalid that size and CRC include. It is kept.
+    /// Whether the end frame of a block transfer declared a segment invalid, but size and CRC include it. The segment
+    /// is kept.
     pub has_wrong_end: bool,
 }
 
@@ -38,7 +39,8 @@ impl Uploaded {
         }
     }
 
-    /// Whether the length contradicts the announced one or a segment is short in the middle: bytes may be missing.
+    /// Whether bytes may be missing: the length differs from the announced one, or a segment before the last one is
+    /// short.
     pub fn has_doubtful_length(&self) -> bool {
         self.has_short_segment || self.announced.is_some_and(|size| usize::try_from(size) != Ok(self.bytes.len()))
     }
@@ -54,13 +56,13 @@ pub struct Upload {
     announced: Option<u32>,
     has_short_segment: bool,
     accept_60: bool,
-    /// The object cannot be longer, in bytes.
+    /// The limit for the size of the object in bytes.
     limit: usize,
     segments: usize,
 }
 
-/// Whether a server answers reads with 60h and the data: this frame contains a device type (1000h). It is no acknowledge
-/// of a write, since 1000h cannot be written.
+/// Whether this frame proves that a server answers an upload with 60h and the data: it contains the device type
+/// (1000h). 1000h cannot be written, so the frame does not acknowledge a download.
 pub fn proves_60(frame: &Frame) -> bool {
     let [0x60, 0x00, 0x10, 0, number @ ..] = frame.data() else { return false };
     number.len() == 4 && number.iter().any(|&byte| byte != 0)

@@ -5,8 +5,8 @@ use super::super::file::{Existing, OutFile, ReportFile, lock_output};
 use crate::output::events::Events;
 use crate::output::failure::ErrorMessage;
 use crate::output::rows::{
-    Dialect, ExistingLines, FileFormat, HeaderMismatch, Layout, LineWriter, QUEUE_CAPACITY, Rotation, Rows, Series,
-    Setup, Target, TimeForm, existing_lines,
+    Dialect, ExistingLines, FileFormat, HeaderMismatch, Layout, LineWriter, OutputTarget, QUEUE_CAPACITY, Rotation,
+    Rows, Series, Setup, TimeForm, existing_lines,
 };
 use crate::tasks::Failure;
 use crate::tasks::log::LogFailure;
@@ -330,7 +330,7 @@ impl OpenFiles {
     pub(super) fn rows(&mut self, waits: bool) -> anyhow::Result<Rows> {
         let target = match &self.rows {
             Some(file) => file.target(self.keep)?,
-            None => Target::Stream(Box::new(open_stdout()?)),
+            None => OutputTarget::Stream(Box::new(open_stdout()?)),
         };
         Ok(Rows::new(line_writer(target, self.series.take(), waits)?, self.setup.clone()))
     }
@@ -350,7 +350,7 @@ impl OpenFiles {
     }
 }
 
-fn line_writer(target: Target, series: Option<Series>, waits: bool) -> anyhow::Result<LineWriter> {
+fn line_writer(target: OutputTarget, series: Option<Series>, waits: bool) -> anyhow::Result<LineWriter> {
     if waits {
         return Ok(LineWriter::direct(target, series));
     }

@@ -91,7 +91,7 @@ impl Recorder {
     }
 
     fn put(&mut self, cycle: Option<u64>, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
-        self.progress.take(samples, sources);
+        self.progress.update_values(samples, sources);
         let mut result = self.rows.put(cycle, samples, sources);
         if let (Ok(()), Some(last)) = (&result, samples.last()) {
             result = self.rows.advance(last.at);

@@ -25,7 +25,7 @@ const LAST_CHANNEL: u8 = 199;
 /// The number of the first signal without a channel.
 pub(super) const FIRST_WITHOUT_CHANNEL: u8 = 200;
 
-/// Stands for a channel that the file does not give, until the signals are numbered.
+/// Placeholder for a missing channel, until the signals are numbered.
 pub(super) const NO_CHANNEL: u8 = u8::MAX;
 
 /// Reports every contradiction.
@@ -58,7 +58,7 @@ impl Known<'_> {
         Known { description }
     }
 
-    /// An object that is used must be described. A description without any object leaves them to the device.
+    /// Reports an object that is used but not described. A description without objects is not checked.
     fn require(&self, table: &Table<'_>, key: &str, object: ObjectId) {
         if !self.description.objects.is_empty() && self.description.object(object).is_none() {
             table.mistake(key, format!("{key}: there is no [[object]] {object}"));
@@ -66,7 +66,7 @@ impl Known<'_> {
     }
 }
 
-/// Whether a name can be typed: it has lower case, digits and hyphens.
+/// Reports a name with characters other than lower case, digits and hyphens.
 fn characters(table: &Table<'_>, name: &str) -> bool {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     let is_plain = !name.is_empty() && name.chars().all(plain);
@@ -78,7 +78,7 @@ fn characters(table: &Table<'_>, name: &str) -> bool {
     is_plain
 }
 
-/// A name of a signal or an object must not read as an address.
+/// Reports the name of a signal or an object that could be an address.
 fn name(table: &Table<'_>, name: &str) {
     if characters(table, name) && name.parse::<ObjectId>().is_ok() {
         table.mistake("name", format!("name: \"{name}\" would be read as an address"));
@@ -114,7 +114,8 @@ fn objects(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
     }
 }
 
-/// Every mapping belongs to a TPDO with parameters, and its default contains described objects with their width.
+/// Checks that every mapping belongs to a TPDO with parameters, and that its default contains described objects with
+/// their width.
 fn pdos(description: &Description, tables: &Tables<'_, '_>) {
     let has = |index: u16| description.objects.iter().any(|object| object.at.first.index == index);
     let numbers: BTreeSet<u16> = description.objects.iter().filter_map(|object| tpdo(object.at.first.index)).collect();
@@ -144,7 +145,7 @@ fn tpdo(index: u16) -> Option<u16> {
     (0x1800..0x1c00).contains(&index).then_some(index & 0x1ff)
 }
 
-/// The entry of a default mapping.
+/// Checks the entry of a default mapping.
 fn mapped(description: &Description, table: &Table<'_>, word: i64) {
     let [bits, sub, low, high, ..] = word.to_le_bytes();
     let object = ObjectId::new(u16::from_le_bytes([low, high]), sub);
@@ -161,7 +162,8 @@ fn mapped(description: &Description, table: &Table<'_>, word: i64) {
     }
 }
 
-/// Default, limits, ranges and meanings fit the type; the default and the meanings are allowed.
+/// Checks that default, limits, ranges and meanings fit the type, and that the default and the meanings are allowed
+/// values.
 fn values(entry: &ObjectEntry, table: &Table<'_>) {
     for (key, scalar) in [("low", &entry.low), ("high", &entry.high), ("default", &entry.default)] {
         let Some(scalar) = scalar else { continue };
@@ -234,7 +236,7 @@ fn signals(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
     }
 }
 
-/// Each bit has one meaning, and the status object has it.
+/// Checks that each bit has one meaning and exists in the status object.
 fn status_bits(bits: &StatusBits, data_type: Option<DataType>, table: &Table<'_>) {
     let all = bits.invalid | bits.high | bits.low;
     let count = [bits.invalid, bits.high, bits.low].map(u64::count_ones).iter().sum::<u32>();
@@ -247,7 +249,7 @@ fn status_bits(bits: &StatusBits, data_type: Option<DataType>, table: &Table<'_>
     }
 }
 
-/// Each number has one meaning, and fits the type of the value.
+/// Checks that each number has one meaning and fits the type of the value.
 fn markers(markers: &Markers, data_type: Option<DataType>, table: &Table<'_>) {
     let mut known = BTreeSet::new();
     for number in markers.invalid.iter().chain(&markers.high).chain(&markers.low) {

@@ -10,7 +10,7 @@ use toml::de::DeTable;
 /// Reads a description.
 ///
 /// # Errors
-/// Every mistake that was found, in the order of the lines; a TOML syntax error is the only one then.
+/// All mistakes, in the order of the lines. A TOML syntax error is reported alone.
 pub fn read(text: &str) -> Result<Description, Vec<DescriptionError>> {
     read_with_notes(text).0
 }

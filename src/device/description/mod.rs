@@ -1,7 +1,7 @@
 //! Device descriptions: the contents of one TOML file in `devices/`, as checked types.
 //!
-//! `load.rs` reads a file once: addresses, ranges and values are parsed, and every mistake has its line. Nothing is
-//! parsed again afterwards.
+//! `load.rs` reads a file once: addresses, ranges and values are parsed, and every mistake has its line. Later code
+//! parses nothing.
 
 mod check;
 mod load;
@@ -53,8 +53,8 @@ pub struct Description {
     pub vendor: String,
     /// The documents that the facts come from.
     pub source: String,
-    /// Whether no manual page supports it. It then allows reading; to store, set a zero, a node-ID or a bit rate, the user
-    /// must name it.
+    /// Whether no manual confirms the description. The description then allows only reading. To store, or to set a
+    /// zero, a node-ID or a bit rate, the user must name the description.
     pub unconfirmed: bool,
     /// The answers by which the device is recognised.
     pub identify: Identify,
@@ -70,7 +70,7 @@ pub struct Description {
     pub error_history: ErrorHistory,
     /// Objects that count errors, shown with the error history.
     pub error_counters: Vec<ObjectId>,
-    /// The longest time in ms over which a repeating average (61A0h) is formed. After it, the device changes to the moving
+    /// The longest time in ms for the repeating average (61A0h). With a longer time, the device uses the moving
     /// average.
     pub repeating_average_ms: Option<u16>,
     /// The device's own table of bit rates: index to bit rate in bit/s.
@@ -165,8 +165,8 @@ pub struct Range {
     pub unit: ObjectId,
 }
 
-/// The answers by which a kind of device is recognised; all that are given must agree. A description without any
-/// is used only if the user names it.
+/// The answers that identify a kind of device; all given ones must agree. A description without any is used only if the
+/// user names it.
 #[derive(Clone, Debug, Default)]
 pub struct Identify {
     /// 1000h, all 32 bits.
@@ -182,7 +182,7 @@ pub struct Identify {
 }
 
 impl Identify {
-    /// Whether no answer is given, so that no device is recognised.
+    /// Whether no answer is given. Then the description recognises no device.
     pub fn is_empty(&self) -> bool {
         self.identity_count() == 0 && self.confirm.is_empty()
     }
@@ -208,7 +208,7 @@ pub struct Factory {
 pub struct SdoStyle {
     /// Whether it indicates sizes (43h, 4Bh …) or omits them (42h).
     pub size: SizeIndication,
-    /// Whether it has no segmented transfer; its strings then have at most four characters.
+    /// Whether the server supports expedited transfers only. Its strings then have at most four characters.
     pub expedited_only: bool,
     /// Whether it supports block transfer.
     pub block: bool,
@@ -219,10 +219,10 @@ pub struct SdoStyle {
 /// Whether the command specifier of an expedited transfer indicates the size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SizeIndication {
-    /// s = 1.
+    /// The size is indicated (s = 1).
     #[default]
     Indicated,
-    /// s = 0: 22h to write, 42h in the answer to a read.
+    /// The size is omitted (s = 0): 22h in a download, 42h in the answer to an upload.
     Omitted,
 }
 
@@ -257,13 +257,13 @@ pub enum Remap {
 pub struct SignalEntry {
     /// `pressure`, `temperature`, `ch1` …
     pub name: String,
-    /// CiA 404 channel (the sub-index), 1 to 199. Signals without one have the numbers from 200.
+    /// CiA 404 channel (the sub-index), 1 to 199. Signals without a channel are numbered from 200.
     pub channel: u8,
     /// The object that is read by SDO if no PDO contains the signal.
     pub value: ObjectId,
     /// The type of the value, if no `[[object]]` states it.
     pub data_type: Option<DataType>,
-    /// The same quantity at other indices than x130h: D-20-9's 2090h.
+    /// Objects at other indices with the same quantity: 2090h of the D-20-9.
     pub also: Vec<ObjectId>,
     /// The object with the physical unit (6131h).
     pub unit: Option<ObjectId>,
@@ -279,9 +279,9 @@ pub struct SignalEntry {
     pub status_bits: Option<StatusBits>,
     /// Whether an overload replaces the value itself (REAL32 NaN, smallest integer).
     pub marker: bool,
-    /// Other numbers that take the place of the value.
+    /// Other numbers that replace the value.
     pub markers: Markers,
-    /// Whether the manual warns that narrow integers may be clipped: their largest number is then no value.
+    /// Whether the manual warns that narrow integers may be clipped. Their largest number is then not a value.
     pub may_clip: bool,
     /// The object with the start of the measuring range (6148h), if the device has it.
     pub span_start: Option<ObjectId>,
@@ -309,15 +309,16 @@ impl SignalEntry {
 pub struct EmergencyEntry {
     /// The emergency error code, bytes 0 and 1.
     pub code: u16,
-    /// Its meaning in words.
+    /// Its meaning.
     pub text: String,
-    /// The bit of 1001h that is set with it, 0 to 7.
+    /// The bit of 1001h that is set by the error, 0 to 7.
     pub register_bit: Option<u8>,
     /// The whole register as the manual prints it.
     pub register: Option<u8>,
     /// The contents of bytes 3 to 7.
     pub bytes: Vec<String>,
-    /// Whether it reports a value outside the measuring range. It is the status of signals without a status object.
+    /// Whether the code reports a value outside the measuring range. Used as the status of signals without a status
+    /// object.
     pub overload: bool,
 }
 
@@ -351,10 +352,10 @@ impl Description {
         (self.emergencies.iter().filter(|entry| entry.register == Some(register)).count() == 1).then_some(register)
     }
 
-    /// The bits of an error register in words: those of the device, else those of CiA 301.
+    /// The names of the bits of an error register: those of the device, else those of CiA 301.
     pub fn register_text(&self, bits: u8) -> String {
         let has_all = |register: u8| register != 0 && bits & register == register;
-        // Every error sets bit 0. Alone, it belongs to an error whose whole register it is.
+        // Every error sets bit 0. If only bit 0 is set, it means the error whose register is 1.
         let is_meant = |register: u8| has_all(register) && (register != 1 || bits == 1);
         let (mut texts, mut covered): (Vec<String>, u8) = (Vec::new(), 0);
         let registers: BTreeSet<u8> = self.emergencies.iter().filter_map(EmergencyEntry::whole_register).collect();

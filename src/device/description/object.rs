@@ -30,8 +30,8 @@ pub struct ObjectEntry {
     pub values: BTreeMap<u64, String>,
     /// The signature that must be written to the object.
     pub signature: Option<Signature>,
-    /// Objects that must all be 0 before this one accepts a number other than 0. On some devices heartbeat and
-    /// node guarding exclude each other in this way.
+    /// Objects that must all be 0 before this object accepts a number other than 0. On some devices heartbeat and node
+    /// guarding exclude each other in this way.
     pub only_if_zero: Vec<ObjectId>,
     /// Whether a TPDO can contain it.
     pub pdo: bool,
@@ -39,7 +39,7 @@ pub struct ObjectEntry {
     pub unit: Option<String>,
     /// The channel whose physical unit (6131h) applies to the number, for objects outside of CiA 404.
     pub follows_unit: Option<u8>,
-    /// The object that contains the code of its unit (as 6131h), if that is not the channel's present unit.
+    /// The object that contains the code of the unit (as 6131h), if it is not the present unit of the channel.
     pub unit_at: Option<ObjectId>,
     /// The group of 1010h that stores it; `None` if 1010h does not.
     pub stored: Option<StoreGroup>,
@@ -78,7 +78,7 @@ pub struct ObjectRun {
     pub first: ObjectId,
     /// The last sub-index.
     pub last_sub: u8,
-    /// Whether it was written as a run, even of one object. Its objects have numbered names.
+    /// Whether the description contains a run, even of one object. The objects of a run have numbered names.
     pub is_run: bool,
 }
 

@@ -20,7 +20,7 @@ pub(super) struct Source<'a> {
     text: &'a str,
     mistakes: RefCell<Vec<DescriptionError>>,
     notes: RefCell<Vec<DescriptionError>>,
-    /// The places of values with a mistake: a value is reported once.
+    /// The places of values with a mistake. Only one mistake per value is reported.
     wrong: RefCell<BTreeSet<usize>>,
 }
 
@@ -34,14 +34,14 @@ impl<'a> Source<'a> {
         self.mistakes.borrow_mut().push(self.at(offset, message));
     }
 
-    /// Adds a mistake of a value, if the value has no other.
+    /// Adds a mistake of a value, unless the value already has one.
     fn mistake_of_value(&self, offset: usize, message: impl Into<String>) {
         if self.wrong.borrow_mut().insert(offset) {
             self.mistake(offset, message);
         }
     }
 
-    /// Adds something that may be a mistake; the description can be used.
+    /// Adds a possible mistake. The description can still be used.
     fn note(&self, offset: usize, message: impl Into<String>) {
         self.notes.borrow_mut().push(self.at(offset, message));
     }
@@ -60,13 +60,13 @@ impl<'a> Source<'a> {
     }
 }
 
-/// One table: it knows which keys were asked for, so that all others are mistakes.
+/// One table. It records the keys that were read; all other keys are mistakes.
 pub(super) struct Table<'t> {
     table: &'t DeTable<'t>,
     offset: usize,
     source: &'t Source<'t>,
     known: Vec<&'static str>,
-    /// The required keys that it does not have.
+    /// The missing required keys.
     missing: Vec<&'static str>,
 }
 
@@ -116,7 +116,7 @@ impl<'t> Table<'t> {
         self.read(key, value)
     }
 
-    /// The value of a key that must be there.
+    /// The value of a required key.
     pub(super) fn required<T: FromToml>(&mut self, key: &'static str) -> Option<T> {
         let Some(value) = self.value(key) else {
             self.missing.push(key);
@@ -184,7 +184,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// Every key that was not asked for is a mistake, and so is every missing key that is not one of them, misspelt.
+    /// Reports every unknown key, and every missing key, unless it is the misspelt unknown key.
     pub(super) fn finish(&mut self) {
         for (name, _) in self.table {
             if !self.known.contains(&name.get_ref().as_ref()) {

@@ -61,7 +61,8 @@ impl Reader<'_> {
             let item = section.get(&key.to_ascii_lowercase())?;
             self.scalar(&format!("[{}] {key}", section.shown), item.line, &item.value, data_type)
         };
-        // The form of a value depends on its type, so an unknown type has none. Text and bytes have no limits.
+        // The form of a value depends on its type, so a value of unknown type is not checked. Text and bytes have no
+        // limits.
         let has_limits = data_type.width().is_some();
         let default = if is_typed { scalar("DefaultValue") } else { None };
         let parameter_value = if is_typed { scalar("ParameterValue") } else { None };
@@ -153,7 +154,7 @@ impl Reader<'_> {
         DataType::from_code(u16::try_from(number(section, "defaultvalue")?).ok()?)
     }
 
-    /// The access type. If the file states no known one, the device decides.
+    /// The access type. If it is missing or unknown, reading and writing are allowed.
     fn access(&mut self, section: &Section) -> Access {
         let item = section.get("accesstype");
         if let Some(access) = item.and_then(|item| value::access(&item.value)) {

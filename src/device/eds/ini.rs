@@ -3,8 +3,8 @@
 //! CiA 306 has no escapes, no quotes and no comments after a value: everything after the first `=` is the value. Letter
 //! case and blanks in names are ignored: `[1018 Sub 1]`, `Supported Objects`.
 //!
-//! If a key or section occurs twice, the first one is used; a second section only adds missing keys. Tools differ here:
-//! Windows' INI function takes the first, CANchkEDS the last. The warning names both lines.
+//! If a key or section occurs twice, the first one is used; a second section only adds missing keys. Other tools
+//! differ: the INI function of Windows uses the first, CANchkEDS the last. The warning contains both lines.
 
 use super::Warning;
 use super::text::{quoted, shown};
@@ -32,7 +32,7 @@ pub(super) struct Section {
 }
 
 impl Section {
-    /// The value of a key that is in lower case and without blanks; `None` if it is missing or empty.
+    /// The value of a key; `None` if it is missing or empty. `key` must be in lower case and without blanks.
     pub(super) fn get(&self, key: &str) -> Option<&Item> {
         self.items.get(key).filter(|item| !item.value.is_empty())
     }
@@ -130,7 +130,7 @@ impl Ini {
         (at, false)
     }
 
-    /// The section with a name in lower case and without blanks.
+    /// The section with this name. `name` must be in lower case and without blanks.
     pub(super) fn section(&self, name: &str) -> Option<&Section> {
         self.sections.get(*self.places.get(name)?)
     }
@@ -141,12 +141,12 @@ pub(super) fn fold(name: &str) -> String {
     name.chars().filter(|character| !character.is_whitespace()).flat_map(char::to_lowercase).collect()
 }
 
-/// CiA 306 has `;` only; people also write `#` and `//`.
+/// CiA 306 has only `;`, but real files also use `#` and `//`.
 fn is_comment(text: &str) -> bool {
     text.starts_with([';', '#']) || text.starts_with("//")
 }
 
-/// Sections with text for people: their lines give no warnings.
+/// Whether a section contains free text. Its lines give no warnings.
 fn is_prose(section: &str) -> bool {
     matches!(section, "fileinfo" | "comments")
 }

@@ -1,11 +1,11 @@
 //! EDS and DCF files (CiA 306): the object dictionary that a vendor ships with a device, and the settings of one
 //! device. The module takes bytes and returns a result; it opens no file and prints no warning.
 //!
-//! Few real files follow CiA 306. Whatever has only one meaning is accepted silently: letter case, blanks, every kind
-//! of line end, a byte order mark, UTF-8, Windows-1252, comments after values, `R`, `RW` and `rwr`, both spellings of
-//! Commissioning, `0x180+$NODEID`, overlong lines. Whatever is lost, guessed or contradictory gives a [`Warning`] with
-//! its line: octal numbers, `0.0` for an integer, defaults that do not fit their type, unknown data types, duplicate
-//! keys, sub-objects without an object. A file is rejected only if it describes no object.
+//! Few real files follow CiA 306. Deviations with only one meaning are accepted silently: letter case, blanks, line
+//! ends, a byte order mark, UTF-8, Windows-1252, comments after values, `R`, `RW` and
+//! `rwr`, both spellings of Commissioning, `0x180+$NODEID`, overlong lines. Lost, guessed or contradictory data gives a
+//! [`Warning`] with its line: octal numbers, `0.0` for an integer, defaults that do not fit their type, unknown data
+//! types, duplicate keys, sub-objects without an object. A file is rejected only if it describes no object.
 //!
 //! `names.rs` describes the names of objects.
 
@@ -40,8 +40,8 @@ pub struct Eds {
     pub value_lines: BTreeMap<ObjectId, usize>,
     /// Objects that tools must skip when they read or write the whole dictionary.
     pub flags: BTreeMap<ObjectId, ObjectFlags>,
-    /// The objects whose data type is missing or unknown. Their entries have the type DOMAIN: they are read by name, as
-    /// bytes, and the user or the device must give the type for a write.
+    /// The objects whose data type is missing or unknown. Their entries have the type DOMAIN and are read as bytes. For
+    /// a write, the user or the device must give the type.
     pub untyped: BTreeSet<ObjectId>,
     /// Warnings, in the order of the lines.
     pub warnings: Vec<Warning>,
@@ -98,14 +98,14 @@ pub struct ObjectFlags {
     pub skip_read: bool,
 }
 
-/// Something in a file that was lost, guessed or contradictory.
+/// Lost, guessed or contradictory data in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
     /// The line, counted from 1.
     pub line: usize,
     /// The index of the object in whose section the line is.
     pub index: Option<u16>,
-    /// One sentence; text from the file in it is short and safe for a terminal.
+    /// One sentence. Text from the file is shortened and safe for a terminal.
     pub text: String,
 }
 

@@ -9,8 +9,8 @@
 //!   (`tpdo-1-parameter:1`; every PDO has a "COB-ID"). Sub-index 0, the count, is always `object:0`.
 //! - The index is appended to a name that two objects have, or that reads as a hexadecimal index ("Add", "Face"):
 //!   `reserved-2005`.
-//! - A sub-object has a second name if that is unique: `identity-object:1`, and `ai-input-pv-1` in an array. So has an
-//!   object with a user's name in a DCF (`Denotation`).
+//! - A sub-object has a second name if that is unique: `identity-object:1`, and `ai-input-pv-1` in an array. An object
+//!   with a user's name in a DCF (`Denotation`) also has a second name.
 //!
 //! No two entries have the same name, and [`Dictionary::find`] finds each by its [`Entry::full_name`].
 
@@ -21,7 +21,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 /// Longest name in characters, as for `ParameterName` in CiA 306.
 const LONGEST: usize = 241;
 
-/// An entry that is yet to be named.
+/// An entry without its final name.
 #[derive(Clone, Debug)]
 pub(super) struct Described {
     /// The entry; its name is the sub-object's own name in the file, or empty.

@@ -36,8 +36,8 @@ const VAR: i128 = 7;
 const ARRAY: i128 = 8;
 const RECORD: i128 = 9;
 
-/// The most memory that the entries may take, in bytes: enough for a hundred thousand. Three lines of a file can
-/// describe 254 entries.
+/// The most memory that the entries may take, in bytes: enough for a hundred thousand. A file can describe 254 entries
+/// in three lines.
 const MOST_BYTES: usize = 32 << 20;
 
 /// Reads every object.

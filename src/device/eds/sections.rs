@@ -5,7 +5,7 @@ use super::text::quoted;
 use super::{Warning, value};
 use std::collections::BTreeMap;
 
-/// Lower indices define data types, which devices do not have as objects.
+/// Lower indices define data types; they are not objects of a device.
 const FIRST_INDEX: u16 = 0x1000;
 
 /// The sections of one object.

@@ -57,7 +57,7 @@ pub(super) fn shown(text: &str) -> String {
     short.escape_debug().to_string()
 }
 
-/// The same in quotation marks.
+/// Like [`shown`], in quotation marks.
 pub(super) fn quoted(text: &str) -> String {
     format!("\"{}\"", shown(text))
 }

@@ -20,7 +20,8 @@ impl<T> Reading<T> {
     }
 }
 
-/// A value; if that fails, the value without a comment after it. CiA 306 has no such comments, real files do.
+/// A value; if that fails, the value without a comment after it. CiA 306 does not allow such comments, but real files
+/// contain them.
 fn tolerant<T>(text: &str, parse: impl Fn(&str) -> Option<T>) -> Option<T> {
     parse(text).or_else(|| without_comment(text).and_then(parse))
 }
@@ -176,7 +177,7 @@ fn formula(text: &str) -> Option<Reading<Scalar>> {
             doubt = number.doubt.or(doubt);
         }
     }
-    // No object takes more than 32 bits for a sum with the node-ID.
+    // An object with a sum of the node-ID has at most 32 bits.
     let sum = u32::try_from(sum).ok().filter(|_| nodes == 1)?;
     Some(Reading { value: Scalar::NodeIdPlus(sum), doubt })
 }
@@ -205,7 +206,7 @@ fn real(text: &str, digits: usize) -> Option<Reading<Scalar>> {
     Some(Reading { value: Scalar::Real(number), doubt: Some(format!("{} {how} {number}", quoted(text))) })
 }
 
-/// A time as the number in its 48 bits, the only form in CiA 306.
+/// A time as a number of 48 bits, the only form in CiA 306.
 fn time(text: &str, data_type: DataType) -> Option<Reading<Scalar>> {
     let number = u64::try_from(plain_integer(text)?.value).ok()?;
     let bytes = number.to_le_bytes();

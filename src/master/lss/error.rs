@@ -45,13 +45,13 @@ pub enum LssError {
         /// The answer.
         frame: Frame,
     },
-    /// Another LSS master is active. The slave in configuration state may be the one that it addressed.
+    /// Another LSS master is active. The other master may have addressed the slave in configuration state.
     #[error("another LSS master sends at the same time: {0}")]
     Disturbed(Frame),
     /// Fastscan got answers but found no address.
     #[error("LSS fastscan: {0}")]
     Fastscan(FastscanError),
-    /// The slave that fastscan found reports another address, or several slaves report theirs.
+    /// The slave that fastscan found reports a different address, or several slaves answer.
     #[error("LSS fastscan: found {found}, but the device reports {reported}")]
     AddressMismatch {
         /// The address that fastscan found.

@@ -5,8 +5,8 @@ use crate::bus::Mono;
 use crate::canopen::lss::{Fastscan, LssAddress, Mode, Progress, Step, Wait};
 use std::time::Duration;
 
-/// The shortest wait for an answer. Most steps of a scan take this time. A later answer makes a part of the scan
-/// repeat.
+/// The shortest wait for an answer. Most steps of a scan take this time. After a later answer, a part of the scan is
+/// repeated.
 const MIN_STEP_TIMEOUT: Duration = Duration::from_millis(4);
 
 /// The shortest wait for an expected answer.

@@ -16,11 +16,11 @@ const CLOCK_TOLERANCE: Duration = Duration::from_millis(5);
 
 /// The effect of a frame on its transfer.
 enum Step {
-    /// The transfer goes on.
+    /// The transfer continues.
     Continued,
-    /// The transfer pauses because of foreign traffic. It starts again later.
+    /// The transfer pauses because of foreign traffic, and is restarted later.
     BackedOff,
-    /// The transfer starts again from its initiate.
+    /// The transfer is restarted.
     Repeated,
     /// The transfer has ended.
     Ended(Result<Answer, SdoError>),
@@ -30,7 +30,7 @@ enum Step {
 struct Context<'a> {
     /// [`crate::device::quirk::Quirk::UploadAnswered60`].
     accept_60: bool,
-    /// A request of this node had two answers.
+    /// Whether a request to this node had two answers.
     has_second_answer: bool,
     timing: &'a Timing,
 }
@@ -101,7 +101,7 @@ impl Node {
         let Some(active) = self.active.take() else { return };
         outgoing.drop_ticket(active.ticket);
         match active.deferred {
-            // Any answer, also an abort, proves that all older requests were answered. Answers to retries of the
+            // Any answer, even an abort, proves that all older requests were answered. Answers to retries of the
             // barrier read come before the answer to the deferred request.
             Some(deferred) => {
                 self.stale.clear();
@@ -186,7 +186,7 @@ impl Active {
         }
     }
 
-    /// Starts the transfer again after a failure if that can help.
+    /// Restarts the transfer after a failure if this can help.
     fn on_failure(
         &mut self,
         error: TransferError,

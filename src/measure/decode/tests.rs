@@ -32,10 +32,10 @@ fn node((object, data_type): (ObjectId, DataType), words: &[u32], signal: impl F
     let mut pressure = Signal {
         name: "pressure".into(),
         channel: 1,
-        value: (object, Some(data_type)),
-        also: vec![ObjectId::new(0x2090, 0)],
+        value_object: (object, Some(data_type)),
+        other_objects: vec![ObjectId::new(0x2090, 0)],
         status: None,
-        marker: false,
+        has_marker: false,
         unit: Some(Unit(0x004e_0000)),
         digits: Some(3),
         rules: crate::measure::layout::Rules::default(),
@@ -78,14 +78,14 @@ const REAL: (ObjectId, DataType) = (ObjectId::new(0x6130, 1), DataType::Real32);
 fn mh4_real_with_status() {
     let mh4 = node(REAL, &[0x6130_0120, 0x6150_0108], |signal| {
         signal.status = Some(ObjectId::new(0x6150, 1));
-        signal.marker = true;
+        signal.has_marker = true;
     });
     assert_eq!(rows(&mh4, &[], "181#0000803F00"), [row("pressure", "1", "ok")]);
     assert_eq!(rows(&mh4, &[], "181#0000C07F03"), [row("pressure", "", "overload-high")]);
     assert_eq!(rows(&mh4, &[], "181#0000C07F05"), [row("pressure", "", "overload-low")]);
     assert_eq!(rows(&mh4, &[], "181#0000C07F00"), [row("pressure", "", "invalid")]);
     assert_eq!(rows(&mh4, &[], "181#0000803F01"), [row("pressure", "", "invalid")]);
-    // Another length than the mapping's, a remote request, a 29-bit identifier: no row.
+    // A length that differs from the mapping, a remote request, or a 29-bit identifier gives no row.
     for other in ["181#", "181#0000803F", "181#0000803F0000", "181#R5", "00000181#0000803F00", "182#0000803F00"] {
         assert_eq!(rows(&mh4, &[], other), [], "{other}");
     }
@@ -103,7 +103,8 @@ fn each_channel_has_its_own_status() {
     assert_eq!(rows(&second, &[], "181#000000803F01"), [row("ai-status:1", "0", ""), row("pressure", "", "invalid")]);
 }
 
-/// Decodes the frames; after the first `before` ones the mapping is read again. Returns the values of the later ones.
+/// Decodes the frames; after the first `before` frames the mapping is read again. Returns the values of the later
+/// frames.
 fn after_reread(words: &[u32], before: usize, frames: &[&str]) -> Vec<String> {
     let node = node(REAL, words, |_| {});
     let mut decoder = Decoder::default();
@@ -160,7 +161,7 @@ fn shared_cob_id_yields_no_samples() {
 fn dps_integer_has_digits_and_no_status() {
     let dps = node((ObjectId::new(0x6130, 1), DataType::Integer(4)), &[0x6130_0120], |_| {});
     let mut dps = dps;
-    // Without a description 6130h is REAL32 by the profile, and the integer is no such number.
+    // Without a description 6130h is REAL32 by the profile, and the integer is not a plausible REAL32.
     assert_eq!(rows(&dps, &[], "181#50C30000"), [row("pressure", "", "invalid")]);
     dps.model = Some(Arc::new(
         Model::from_toml(
@@ -176,10 +177,10 @@ use crate::device::catalog::Model;
 
 #[test]
 fn markers_count_only_if_the_device_has_them() {
-    let marked = node(REAL, &[0x9130_0120], |signal| signal.marker = true);
+    let marked = node(REAL, &[0x9130_0120], |signal| signal.has_marker = true);
     assert_eq!(rows(&marked, &[], "181#00000080"), [row("pressure", "", "invalid")]);
     assert_eq!(rows(&marked, &[], "181#D2040000"), [row("pressure", "1.234", "ok")]);
-    // NaN is no number on any device.
+    // NaN is invalid on every device.
     let other = node(REAL, &[0x6130_0120], |_| {});
     assert_eq!(rows(&other, &[], "181#0000C07F"), [row("pressure", "", "invalid")]);
     assert_eq!(rows(&other, &[], "181#0000807F"), [row("pressure", "", "invalid")]);
@@ -188,7 +189,7 @@ fn markers_count_only_if_the_device_has_them() {
 #[test]
 fn other_objects_of_a_signal_and_objects_without_signal() {
     let d20 = node(REAL, &[0x2090_0020], |_| {});
-    // Without a description the type of 2090h is unknown: no value. It is still the signal.
+    // Without a description the type of 2090h is unknown, so the signal has no value.
     assert_eq!(rows(&d20, &[], "181#D2040000"), [row("pressure", "", "")]);
     let raw = node(REAL, &[0x7100_0110, 0x0005_0008], |_| {});
     assert_eq!(rows(&raw, &[], "181#100E00"), [row("0x7100:1", "3600", "")]);

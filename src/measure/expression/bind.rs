@@ -59,13 +59,13 @@ impl AvailableSignals {
         available
     }
 
-    /// Adds a name for the object that is called `known` in [`Source`], unless it is known.
+    /// Adds `name` for the object called `known` in [`Source`], unless `name` already exists.
     pub fn name_object(&mut self, node: NodeId, name: &str, known: &str) {
         let signal = AvailableSignal { node, name: known.to_owned(), unit: None };
         self.objects.entry((node, name.to_lowercase())).or_insert(signal);
     }
 
-    /// Adds every named object of the description or EDS, the names in the spelling of the EDS, and the parts of signals.
+    /// Adds every named object of the description or EDS, also with its name in the EDS, and the parts of signals.
     fn add_objects(&mut self, layout: Layout<'_>) {
         for (signal, (part, low)) in layout.signals.iter().flat_map(|signal| PARTS.map(|part| (signal, part))) {
             let (node, name) = (layout.node, format!("{}.{part}", signal.name));
@@ -186,12 +186,12 @@ pub struct BoundExpression {
 }
 
 impl Expression {
-    /// Whether it applies to each node that is checked: one of its signals has no node.
+    /// Whether the expression applies to each checked node, because one of its signals has no node.
     pub fn applies_to_each_node(&self) -> bool {
         self.signals().iter().any(|signal| signal.node.is_none())
     }
 
-    /// Checks that it names no other nodes than these.
+    /// Checks that the expression contains only these nodes.
     ///
     /// # Errors
     /// The first other node.
@@ -204,7 +204,7 @@ impl Expression {
         Ok(())
     }
 
-    /// Checks that it needs no other signals than the recorded ones.
+    /// Checks that the expression needs only recorded signals.
     ///
     /// # Errors
     /// The first other signal.
@@ -216,7 +216,7 @@ impl Expression {
         }
     }
 
-    /// Finds its signals. Signals without a node are searched at `node`.
+    /// Finds the signals of the expression. Signals without a node are searched at `node`.
     ///
     /// # Errors
     /// A signal that does not exist, or units that cannot be compared.

@@ -26,7 +26,7 @@ impl Arrivals {
         self.last = now;
     }
 
-    /// Whether the signal stopped: nothing was received for five of its intervals, and at least for one second.
+    /// Whether the signal stopped: no sample for five of its intervals, and for at least one second.
     fn has_stopped(&self, end: Mono) -> bool {
         let intervals = self.count.saturating_sub(1).max(1);
         let usual = self.last.since(self.first) / intervals;
@@ -34,7 +34,7 @@ impl Arrivals {
     }
 }
 
-/// The inputs of one formula. The formula is evaluated when each of them has a new value.
+/// The inputs of one formula. The formula is evaluated when each input has a new value.
 #[derive(Clone, Debug)]
 struct InputGroup {
     inputs: Vec<usize>,
@@ -67,7 +67,7 @@ impl InputGroup {
     }
 }
 
-/// The evaluation of a group of inputs.
+/// The use of the value of an input group.
 #[derive(Clone, Copy, Debug)]
 enum Purpose {
     /// A rule for each sample.
@@ -90,7 +90,7 @@ pub(super) struct Comparison {
     arrivals: Vec<Arrivals>,
     digits: Vec<Option<u8>>,
     groups: Vec<(InputGroup, Purpose)>,
-    /// For each rule: the number of evaluated samples, and how many of them had no valid value.
+    /// For each rule: the number of evaluated samples, and the number of those without a valid value.
     evaluated: Vec<(u64, u64)>,
     aggregates: Vec<Statistics>,
     shown: Vec<Statistics>,
@@ -138,7 +138,7 @@ impl Comparison {
 
     /// Adds a value of an input.
     pub(super) fn add(&mut self, input: usize, value: Option<f64>, digits: Option<u8>, context: SampleContext) {
-        // If another input is still missing, the old value is evaluated before it is replaced.
+        // If another input has no new value yet, the old value is evaluated before it is replaced.
         self.evaluate_groups(|group| group.is_fresh(input), self.last.unwrap_or(context));
         self.values[input] = value;
         self.arrivals[input].add(context.0.mono);

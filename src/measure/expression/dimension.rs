@@ -1,8 +1,8 @@
 //! Units in expressions: which values can be compared, and how they are converted to one unit.
 //!
-//! The scales degC, degF and K have different zero points. A temperature is therefore converted with the offset of
-//! the scale, a temperature difference without it. Each value carries the number of times it contains the offset:
-//! once in a temperature, not at all in a difference of two. If this number is unknown, the conversion is refused.
+//! The scales degC, degF and K have different zero points. So a temperature is converted with the offset of the scale,
+//! and a temperature difference without it. Each value has the number of offsets it contains: 1 in a temperature, 0 in
+//! a difference of two. If this number is unknown, the conversion is rejected.
 
 use super::LocatedError;
 use super::formula::Formula;
@@ -14,7 +14,7 @@ use crate::device::unit::Unit;
 pub(super) enum Offsets {
     /// The number of times: 1 in a temperature, 0 in a difference of two.
     Known(f64),
-    /// A number in the expression. It adapts to the other side.
+    /// A number in the expression. It takes the number of the other side.
     Literal,
     /// Unknown, for example in a product of two temperatures.
     Unknown,
@@ -38,7 +38,7 @@ pub(super) struct Typed {
     pub(super) formula: Formula,
     /// The unit of its value.
     pub(super) dimension: Dimension,
-    /// The value is neither calculated nor converted.
+    /// Whether the value is neither calculated nor converted.
     pub(super) exact: bool,
     /// The quantity as written in the expression.
     pub(super) name: String,
@@ -47,12 +47,12 @@ pub(super) struct Typed {
 }
 
 impl Typed {
-    /// A number with a unit in the expression.
+    /// Whether the quantity is a number with a unit in the expression.
     fn is_literal(&self) -> bool {
         matches!(self.dimension, Dimension::In(_, Offsets::Literal))
     }
 
-    /// `p is in bar` or `p has no unit`.
+    /// Text for errors: `p is in bar` or `p has no unit`.
     fn describe_unit(&self) -> String {
         match self.dimension {
             Dimension::In(unit, _) => format!("{} is in {unit}", self.name),
@@ -87,7 +87,7 @@ impl Typed {
 
 fn units_differ(first: &Typed, second: &Typed) -> LocatedError {
     let message = format!("units do not match: {}, {}", first.describe_unit(), second.describe_unit());
-    // Point at the number, because the user can change it.
+    // Report the position of the number, because the user can change it.
     LocatedError::new(if first.is_literal() { first.at } else { second.at }, message)
 }
 
@@ -153,8 +153,8 @@ pub(super) fn calculate(
     Ok(Typed { formula, dimension, exact: false, name, at: start })
 }
 
-/// Converts one term of a sum. A number in another temperature unit is refused: it could be a temperature or a
-/// temperature difference. In the unit of the other term both are the same.
+/// Converts one term of a sum. A number in another temperature unit is rejected: it could be a temperature or a
+/// difference. In the unit of the other term, both are the same number.
 fn addend(term: Typed, to: &Typed) -> Result<Typed, LocatedError> {
     if let (Dimension::In(from, Offsets::Literal), Dimension::In(unit, offsets)) = (term.dimension, to.dimension)
         && offsets != Offsets::Known(0.0)

@@ -1,8 +1,8 @@
 //! Evaluates expressions: samples in, verdicts out.
 //!
-//! - Each sample must satisfy the expression. A sample without a valid value satisfies nothing; only `invalid()`
-//!   accepts it. A value outside the measuring range is not valid here, even if the device still sends a number.
-//! - A comparison of several signals is evaluated when each of them has a new value. If a signal has a second value
+//! - Each sample must satisfy the expression. A sample without a valid value fails every expression except `invalid()`.
+//!   A value outside the measuring range is invalid, even if the device still sends a number.
+//! - A comparison of several signals is evaluated when each signal has a new value. If a signal has a second value
 //!   before that, its first value is compared with the latest values of the others. So no sample is skipped.
 
 use super::bind::{AvailableSignals, BoundExpression, unit_of};
@@ -27,7 +27,7 @@ struct Route {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum UnitChange {
     Unchanged,
-    /// The unit changed, and can be converted from the first to the second unit.
+    /// The unit changed. The first unit can be converted to the second.
     Convertible(Unit, Unit),
     /// The new unit cannot be converted: the values are invalid.
     Incompatible,
@@ -46,7 +46,7 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// An evaluator without signals. An expression that is given twice has one verdict.
+    /// An evaluator without signals. A repeated expression has one verdict.
     pub fn new(all: &[Expression]) -> Evaluator {
         let mut expressions: Vec<Expression> = Vec::new();
         for expression in all {
@@ -59,8 +59,9 @@ impl Evaluator {
 
     /// Finds the signals of the expressions. An expression without a node is evaluated for each of `nodes`.
     ///
-    /// With `skip_unsupported`, a node without the signal is skipped if another node has it. An expression that needs
-    /// a node of `missing` has a verdict without data.
+    /// With
+    /// `skip_unsupported`, a node without the signal is skipped if another node has it. An expression that needs a node in `missing`
+    /// has a verdict without data.
     ///
     /// # Errors
     /// A signal that does not exist, or units that cannot be compared.
@@ -114,7 +115,7 @@ impl Evaluator {
         Ok(())
     }
 
-    /// Adds a verdict without data for each of `nodes` that sent nothing.
+    /// Adds a verdict without data for each silent node in `nodes`.
     pub fn add_missing_nodes(&mut self, nodes: &[NodeId]) {
         for expression in self.expressions.iter().filter(|expression| expression.applies_to_each_node()) {
             for &node in nodes {
@@ -137,7 +138,7 @@ impl Evaluator {
         self.comparisons.iter().map(Comparison::bound)
     }
 
-    /// The signals to measure of a node, without repetitions.
+    /// The signals of a node to measure, without repetitions.
     pub fn wanted_of(&self, node: NodeId) -> Vec<Wanted> {
         let mut wanted = Vec::new();
         for input in self.bound().flat_map(|bound| &bound.inputs).filter(|input| input.node == node) {
@@ -157,7 +158,7 @@ impl Evaluator {
             let first = *self.first.get_or_insert(sample.at.mono);
             let elapsed = sample.at.mono.since(first);
             for route in self.routes.get(sample.source).into_iter().flatten() {
-                // Without its decimal digits a number is wrong by a power of ten.
+                // Without its decimal digits, a number may be wrong by a power of ten.
                 let is_scaled = sample.doubt != Some(Doubt::UnknownDigits);
                 let is_valid = is_scaled && !sample.status.is_some_and(Status::is_overload);
                 let value = sample.value.filter(|_| is_valid).map(printed_value).and_then(|value| match route.unit {
@@ -204,7 +205,7 @@ impl Evaluator {
     }
 }
 
-/// The value as printed. A REAL32 value that prints as 9.95 is compared as 9.95.
+/// The value as printed. For example, a REAL32 value printed as 9.95 is compared as 9.95.
 fn printed_value(number: Number) -> f64 {
     match number {
         Number::Real32(_) => number.to_string().parse().unwrap_or_else(|_| number.as_f64()),
@@ -221,7 +222,7 @@ fn routes(comparisons: &[Comparison], source: &Source) -> Vec<Route> {
                 continue;
             }
             let unit = match (unit_of(source), known.unit) {
-                // Without a known unit, the expression uses none.
+                // If the expected unit is unknown, the expression uses none.
                 (_, None) => UnitChange::Unchanged,
                 (now, then) if now == then => UnitChange::Unchanged,
                 (Some(now), Some(then)) if now.convert(0.0, then).is_some() => UnitChange::Convertible(now, then),

@@ -3,8 +3,8 @@
 use super::tree::{Operator, Relation};
 use crate::device::unit::Unit;
 
-/// Calculated values that differ by less than this share of the larger one are equal. It covers rounding errors of
-/// the calculation, and is far below the resolution of any sensor.
+/// Calculated values that differ by less than this share of the larger one are equal. This share is larger than
+/// rounding errors, and far below the resolution of any sensor.
 const ROUNDING: f64 = 1e-9;
 
 /// The values at one moment.
@@ -25,7 +25,7 @@ pub(super) enum Formula {
     Negative(Box<Formula>),
     Absolute(Box<Formula>),
     Arithmetic(Box<Formula>, Operator, Box<Formula>),
-    /// Converts from one unit to another. The number is how many times the value contains the offset of its scale.
+    /// Converts from one unit to another. The number is the number of offsets of the scale in the value.
     Converted(Box<Formula>, Unit, Unit, f64),
 }
 
@@ -81,7 +81,7 @@ impl Formula {
 pub(super) enum Rule {
     /// A comparison. The flag is `true` if both sides are exact: neither calculated nor converted.
     Compare(Formula, Relation, Formula, bool),
-    /// A range. Both ends belong to it.
+    /// A range, ends included.
     Within(Formula, Formula, Formula, bool),
     And(Box<Rule>, Box<Rule>),
     Or(Box<Rule>, Box<Rule>),

@@ -95,7 +95,7 @@ fn is_letter(character: char) -> bool {
     character.is_ascii_alphabetic() || matches!(character, '\u{b0}' | '\u{b5}' | '\u{3bc}')
 }
 
-/// Returns the name at the start of a text. A hyphen belongs to the name if it stands between two letters:
+/// Returns the name at the start of a text. A hyphen between two letters belongs to the name:
 /// `oil-pressure` is a name, `a - b` and `a-1` are differences.
 fn name(text: &str) -> &str {
     let mut end = 0;
@@ -155,7 +155,7 @@ fn number_or_signal(text: &str, at: Position) -> Result<(Token, usize), LocatedE
     Ok((Token::Number(number), length))
 }
 
-/// The type after an object, and the length of its text: `/i16`. Anything else after the slash is a divisor.
+/// The type after an object, and the length of its text: `/i16`. Any other text after the slash is a divisor.
 fn stated_type(text: &str) -> (Option<DataType>, usize) {
     let Some(word) = text.strip_prefix('/').map(alphanumeric) else { return (None, 0) };
     match word.parse().ok().filter(|data_type: &DataType| data_type.is_number()) {

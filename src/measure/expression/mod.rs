@@ -3,7 +3,7 @@
 //! ```text
 //! condition:   condition and condition, condition or condition, not condition, (condition)
 //!              quantity < quantity          also <= > >= == !=
-//!              quantity in quantity..quantity, both ends belong to the range
+//!              quantity in quantity..quantity (ends included)
 //! quantity:    quantity + quantity          also - * /, -quantity, (quantity), |quantity|
 //!              10, 9.95 bar, 1.2 psi        a number without a unit takes the unit of the other side
 //!              pressure, ch1, pressure.status, 0x6130:1; of one node: 5.pressure
@@ -11,7 +11,7 @@
 //! ```
 //!
 //! - [`Expression::parse`] reads the text before anything is measured.
-//! - [`bind`] finds the signals and converts the units, when the devices are known.
+//! - [`bind`] finds the signals and converts the units as soon as the devices are known.
 //! - [`evaluator`] takes samples and returns verdicts.
 //!
 //! This module does no I/O and reads no clock. Every text is an expression or an error with a position.
@@ -128,7 +128,7 @@ impl FromStr for Expression {
     }
 }
 
-/// Splits a condition at each `and`. Both sides must be true for every sample, so each is evaluated alone.
+/// Splits a condition at each `and`. Both sides must be true for every sample, so each one is evaluated separately.
 fn split(condition: Condition, parts: &mut Vec<Condition>) {
     match condition {
         Condition::And(left, right) => {
@@ -147,7 +147,7 @@ pub struct ExpressionError {
     pub text: String,
     /// Byte offset of the mistake in `text`. It is the length of `text` if the end is missing.
     pub at: usize,
-    /// The mistake, for people.
+    /// The message for the user.
     pub message: String,
     /// How to correct it.
     pub hint: Option<String>,

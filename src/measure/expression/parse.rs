@@ -53,7 +53,7 @@ pub(super) fn parse(text: &str) -> Result<Condition, LocatedError> {
             let error = LocatedError::new(parser.at(), format!("unexpected {}", spelling(token)));
             Err(match token {
                 Token::Sign("<" | "<=" | ">" | ">=" | "==" | "!=") => {
-                    error.hint("write a range with in: pressure in 9.95..10.05")
+                    error.hint("write a range with \"in\": pressure in 9.95..10.05")
                 }
                 _ => error,
             })
@@ -113,7 +113,7 @@ impl Parser {
         Ok(())
     }
 
-    /// Parses something nested, one level deeper.
+    /// Parses nested content, one level deeper.
     fn nested<T>(&mut self, parse: impl FnOnce(&mut Parser) -> Result<T, LocatedError>) -> Result<T, LocatedError> {
         if self.depth == MAX_DEPTH {
             return Err(LocatedError::new(self.at(), format!("nested too deeply (at most {MAX_DEPTH} levels)")));
@@ -168,7 +168,7 @@ impl Parser {
         if self.skip("in") {
             let value = left.quantity()?;
             let low = self.sum()?.quantity()?;
-            self.expect("..").map_err(|error| error.hint("write a range with two points: 9.95..10.05"))?;
+            self.expect("..").map_err(|error| error.hint("write \"..\" between the ends of the range: 9.95..10.05"))?;
             let high = self.sum()?.quantity()?;
             let (low, high) = share_unit(low, high)?;
             return Ok(Parsed::Condition(Condition::Within(value, low, high, at), start));
@@ -278,7 +278,7 @@ impl Parser {
         Ok(Some(self.divided_unit(&word).unwrap_or(unit)))
     }
 
-    /// The unit with a denominator, such as `l/h`, if one follows and the unit exists.
+    /// The unit with a denominator, such as `l/h`, if a denominator follows and the unit exists.
     fn divided_unit(&mut self, numerator: &str) -> Option<Unit> {
         let [Token::Sign("/"), Token::Word(denominator)] = [0, 1]
             .map(|at| self.tokens.get(self.next + at).map(|(token, _)| token.clone()))
@@ -292,7 +292,7 @@ impl Parser {
     }
 }
 
-/// In `9.95..10.05 bar` both ends have the unit bar. A range whose first number is the larger one is refused.
+/// In `9.95..10.05 bar` both ends have the unit bar. A reversed range is rejected.
 fn share_unit(mut low: Quantity, mut high: Quantity) -> Result<(Quantity, Quantity), LocatedError> {
     let at = high.at();
     if let (Some((first, low)), Some((second, high))) = (literal(&mut low), literal(&mut high)) {

@@ -285,7 +285,7 @@ fn each_sample_must_satisfy() {
         ("pressure < 1 or pressure > 3", &[0.0, 4.0], Outcome::Ok),
         ("pressure < 1 or pressure > 3", &[2.0], Outcome::Fail),
         ("not pressure < 3", &[3.0], Outcome::Ok),
-        // An invalid value satisfies nothing, not even a negation.
+        // An invalid value fails every expression, even a negation.
         ("pressure < 3", &[1.0, NAN], Outcome::Fail),
         ("not pressure < 3", &[NAN], Outcome::Fail),
         ("pressure < 1 or not pressure < 1", &[NAN], Outcome::Fail),
@@ -414,7 +414,7 @@ fn mismatched_units_are_refused() {
 
 #[test]
 fn several_signals_are_compared_when_each_has_a_new_value() {
-    // Both signals rise. Inside a cycle one is ahead of the other, which is not a difference.
+    // Both signals rise. Within a cycle one signal is received before the other; this must not count as a difference.
     let rising: Vec<f64> = (0..100).map(f64::from).collect();
     let two = [("5.p", "bar", &rising[..]), ("6.p", "bar", &rising)];
     let result = verdict("5.p - 6.p == 0", &two);

@@ -92,7 +92,7 @@ impl Function {
         Function::Invalid,
     ];
 
-    /// Its text in an expression.
+    /// The text in an expression.
     pub fn as_str(self) -> &'static str {
         match self {
             Function::Mean => "mean",
@@ -106,7 +106,7 @@ impl Function {
         }
     }
 
-    /// Whether it needs more than one sample.
+    /// Whether the function needs more than one sample.
     pub fn needs_many_samples(self) -> bool {
         matches!(self, Function::Noise | Function::Rate | Function::Gap)
     }
@@ -126,7 +126,7 @@ pub enum Operator {
 }
 
 impl Operator {
-    /// Its text in an expression.
+    /// The text in an expression.
     pub fn as_str(self) -> &'static str {
         match self {
             Operator::Add => "+",
@@ -162,7 +162,7 @@ pub enum Relation {
 }
 
 impl Relation {
-    /// Its text in an expression.
+    /// The text in an expression.
     pub fn as_str(self) -> &'static str {
         match self {
             Relation::Less => "<",

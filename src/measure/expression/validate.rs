@@ -3,10 +3,10 @@
 use super::LocatedError;
 use super::tree::{Condition, Position, Quantity};
 
-/// When the value of a quantity is known.
+/// The moment from which the value of a quantity is known.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Availability {
-    /// It is a constant.
+    /// Always, because it is a constant.
     Always,
     /// With each sample.
     EachSample,

@@ -11,7 +11,7 @@ use std::time::Duration;
 pub enum Outcome {
     /// All samples satisfy the expression.
     Ok,
-    /// At least one sample does not satisfy it, or is invalid.
+    /// At least one sample is invalid or does not satisfy the expression.
     Fail,
     /// There are not enough samples to decide.
     NoData,
@@ -26,9 +26,9 @@ pub struct QuantityValue {
     pub unit: Option<Unit>,
     /// The device's decimal digits. `None` if the value was calculated.
     pub digits: Option<u8>,
-    /// The value was not calculated or converted.
+    /// Whether the value was neither calculated nor converted.
     pub is_exact: bool,
-    /// The value. It is the mean if there are several samples.
+    /// The value; the mean if there are several samples.
     pub value: Option<f64>,
     /// Lowest and highest value, if there are several samples.
     pub range: Option<(f64, f64)>,
@@ -47,7 +47,7 @@ pub struct Violation {
     pub status: Option<Status>,
 }
 
-/// Why there is no decision, or why it failed without a violation.
+/// Why there is no decision, or why an expression failed without a violation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reason {
     /// The node or the signal failed. The number is an index into the failures of the report.
@@ -78,7 +78,7 @@ pub enum Reason {
     NotANumber,
 }
 
-/// The result of one expression, for one node if the expression names no node.
+/// The result of one expression. If the expression contains no node, it is the result for one node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// The expression as entered.

@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 
 /// A survey of one node that never waits.
 ///
-/// [`survey_nodes`] is written as if it waited for each answer. Here it runs with the answers received so far, and
-/// stops at the first object without an answer. That object is requested. When its answer arrives, the survey runs
-/// again from the start. A complete survey needs about eight runs.
+/// [`survey_nodes`] normally waits for each answer. Here it runs with the answers received so far, and stops at the
+/// first object without an answer. This object is then requested. When the answer arrives, the survey runs again from
+/// the start. A complete survey needs about eight runs.
 pub struct BackgroundSurvey {
     node: NodeId,
     overrides: Overrides,
@@ -82,7 +82,7 @@ impl BackgroundSurvey {
         let error = result.as_ref().err().filter(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }));
         let was_silent = std::mem::replace(&mut self.is_silent, error.is_some());
         if let Some(error) = error {
-            // The others are asked again, unless the node is silent twice in a row.
+            // The other objects are requested again, unless the node is silent twice in a row.
             master.forget(std::mem::take(&mut self.pending).into_keys());
             if was_silent {
                 return Some(Err(Error::Sdo(error.clone())));

@@ -60,8 +60,8 @@ pub(super) fn read_ranges<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<
 
 /// Whether the samples of a signal depend on its measuring range.
 fn needs_range(node: &Node, signal: &Signal) -> bool {
-    let has_no_status = node.model.is_some() && signal.has_no_status();
-    has_no_status || is_narrow(signal.value.1) || has_narrow_entry(node, signal)
+    let lacks_status = node.model.is_some() && !signal.has_status();
+    lacks_status || is_narrow(signal.value_object.1) || has_narrow_entry(node, signal)
 }
 
 /// Whether a TPDO contains the signal as an integer that may be too narrow.

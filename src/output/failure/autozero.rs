@@ -5,7 +5,7 @@ use crate::canopen::id::NodeId;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::autozero::{
-    Action, AutozeroEffect, AutozeroFact, AutozeroFailure, Objection, OffsetChange, Quantity, Undo,
+    AutozeroEffect, AutozeroFact, AutozeroFailure, Objection, OffsetChange, Proof, Quantity, Undo, ZeroTarget,
 };
 use crate::tasks::store::Group;
 
@@ -18,9 +18,9 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
             Words::new(format!("{title} has no autozero of channel {channel}"))
                 .hint(format!("it has one of: {}", list(available)))
         }
-        AutozeroFailure::WhichChannel { action, available } if available.is_empty() => {
+        AutozeroFailure::WhichChannel { target, available } if available.is_empty() => {
             Words::new("the device has several channels: choose one")
-                .hint(format!("cangauge {} {node} --channel 1", action.as_str()))
+                .hint(format!("cangauge {} {node} --channel 1", target.as_str()))
         }
         AutozeroFailure::NoTare => {
             Words::new("no description or EDS of it has a tare (0x6139) and a net value (0x6140)")
@@ -49,10 +49,10 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
         AutozeroFailure::RestartedBefore => {
             Words::new("the device restarted during the measurement: nothing was changed")
         }
-        AutozeroFailure::Unsafe { action, objection, channel } => {
+        AutozeroFailure::Unsafe { target, objection, channel } => {
             let words = Words::new(format!("{}: nothing was changed", reason(objection)));
             let choice = channel.map(|channel| format!(" --channel {channel}")).unwrap_or_default();
-            words.hint(remedy(*action, objection, &node, &choice))
+            words.hint(remedy(*target, objection, &node, &choice))
         }
         AutozeroFailure::RestartedAfter => Words::new(
             "the device accepted the signature, then restarted: the zero is lost unless the device stored it",
@@ -120,7 +120,7 @@ fn reason(objection: &Objection) -> String {
 }
 
 /// What to do about an objection.
-fn remedy(action: Action, objection: &Objection, node: &str, choice: &str) -> String {
+fn remedy(target: ZeroTarget, objection: &Objection, node: &str, choice: &str) -> String {
     match objection {
         Objection::Absolute => "apply a vacuum and use --force".to_owned(),
         Objection::Invalid { .. } => format!("show the errors of the device: cangauge errors {node}"),
@@ -130,7 +130,7 @@ fn remedy(action: Action, objection: &Objection, node: &str, choice: &str) -> St
                 "vent or isolate the line; if the limit is too low: cangauge autozero {node}{choice} --limit {enough}"
             )
         }
-        Objection::Unsteady { .. } if action == Action::Tare => "wait until the value is steady".to_owned(),
+        Objection::Unsteady { .. } if target == ZeroTarget::Tare => "wait until the value is steady".to_owned(),
         Objection::Unsteady { .. } => "wait until the value is steady, or use --force".to_owned(),
         Objection::TotalOffset { .. } => {
             "several small offsets have added up: check the sensor, or use --force".to_owned()
@@ -177,8 +177,11 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &AutozeroFact) -> Note
     match fact {
         AutozeroFact::Forced(objection) => NoteText::new("forced", format!("forced: {}", reason(objection))),
         AutozeroFact::NothingChanged => NoteText::new("nothing-changed", "nothing was changed"),
-        AutozeroFact::ProvedBy { offset } => {
-            let proof = if *offset { "the offset" } else { "the reading" };
+        AutozeroFact::ProvedBy(proof) => {
+            let proof = match proof {
+                Proof::Offset => "the offset",
+                Proof::Reading => "the reading",
+            };
             NoteText::new(
                 "no-answer",
                 format!("no answer to the signature; {proof} proves that the device executed it"),

@@ -7,7 +7,9 @@ use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::sdo::Violation;
-use crate::tasks::failure::{BusError, Clue, ExpressionError, LssError, Operation, SdoError, SdoFailure, SecondAnswer};
+use crate::tasks::failure::{
+    BusError, ExpressionError, LssError, MissedAnswer, Operation, SdoError, SdoFailure, SecondAnswer,
+};
 use std::path::Path;
 use std::time::Duration;
 
@@ -91,7 +93,7 @@ fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
 pub(super) fn sdo(error: &SdoError) -> Words {
     let words = Words::new(error.to_string());
     match error.failure {
-        SdoFailure::NoAnswer { waited, started, clue } => match silence_advice(error.node, waited, started, clue) {
+        SdoFailure::NoAnswer { waited, started, missed } => match silence_advice(error.node, waited, started, missed) {
             Some(hint) => words.hint(hint),
             None => words,
         },
@@ -137,16 +139,16 @@ pub fn second_answer(node: NodeId, answers: SecondAnswer) -> String {
 }
 
 /// The hint for a node that does not answer.
-fn silence_advice(node: NodeId, waited: Duration, started: bool, clue: Clue) -> Option<String> {
-    if let Some(frame) = clue.frame {
+fn silence_advice(node: NodeId, waited: Duration, started: bool, missed: MissedAnswer) -> Option<String> {
+    if let Some(frame) = missed.frame {
         let channel = frame.id().sdo_response_node();
         return (channel.is_none()).then(|| {
             format!("if it answers with another COB-ID, state the channel: --sdo {node}=0xTX:0x{}", frame.id())
         });
     }
-    Some(match clue.state {
+    Some(match missed.state {
         Some(NmtState::Stopped) => format!("a stopped node answers no SDO: cangauge nmt preop {node}"),
-        _ if clue.has_answered || started => {
+        _ if missed.has_answered || started => {
             format!(
                 "the node answered before: allow it more time with -t {}",
                 format_duration(waited * 4).replace(' ', "")

@@ -64,7 +64,7 @@ fn of_problem(problem: &Problem) -> Words {
         Problem::UnknownKey { device, nearest } => {
             let owner = device.as_ref().map(|title| format!("{title} has no such setting"));
             let message = owner.unwrap_or_else(|| "no such setting".to_owned());
-            if nearest.is_empty() { message } else { format!("{message} (nearest: {})", list(nearest)) }
+            if nearest.is_empty() { message } else { format!("{message} (similar: {})", list(nearest)) }
         }
         Problem::Twice { other } => format!("the same setting as {other}"),
         Problem::Type { expected, found } => format!("{found} instead of {expected}"),

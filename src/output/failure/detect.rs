@@ -19,7 +19,7 @@ pub(super) fn words(cause: &DetectFailure) -> Words {
                     format!("the devices may be silent: listen longer (--for 5s), or {ask}"),
                 ),
                 (true, _) => (
-                    "no valid frame and no acknowledge at any bit rate",
+                    "no valid frame and no acknowledgement at any bit rate",
                     "check the sensor's power, the wiring and the 120 ohm terminators".to_owned(),
                 ),
             };

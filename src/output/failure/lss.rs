@@ -43,7 +43,7 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
             Words::new(another(sign))
                 .hint(format!("name one device by its {names} or its identity; list them: cangauge lss scan"))
         }
-        LssCause::NoDevice => Words::new("no device answers, neither by SDO nor by LSS")
+        LssCause::NoDevice => Words::new("no device answers by SDO or LSS")
             .hint("check power, wiring and bit rate; find the cause: cangauge doctor all"),
         LssCause::NoUnconfigured => Words::new("no device without a node-ID answers")
             .hint("fastscan finds only devices without a node-ID; find the others: cangauge doctor all"),
@@ -101,8 +101,7 @@ fn service(device: &DeviceName, error: &LssError) -> Words {
     let is_silent = matches!(error, LssError::NoAnswer { service, .. } if below::is_addressing(*service));
     match (device.node, device.address) {
         (Some(node), Some(address)) if is_silent => words.hint(format!(
-            "it may answer LSS in STOPPED only: cangauge nmt stop {node}; cangauge lss inquire {address} (if it answers, \
-             use this target for the other LSS commands); cangauge nmt preop {node}"
+            "it may answer LSS only in STOPPED: cangauge nmt stop {node} && cangauge lss inquire {address}"
         )),
         _ => words,
     }
@@ -207,7 +206,8 @@ fn retime(cause: &LssCause) -> Words {
                 HostObstacle::AppliesAtPowerOn => "the device changes its bit rate at power-on",
                 HostObstacle::AppliesAfterStore => "the device changes its bit rate only after it is stored",
             };
-            Words::new(format!("{why}, so the host cannot follow")).hint("omit --retime, and set the interface by hand")
+            Words::new(format!("{why}, so the host cannot change its bit rate together with the device"))
+                .hint("omit --retime, and set the interface by hand")
         }
         LssCause::NotAloneForRetime(neighbour) => {
             let other = match neighbour {
@@ -222,7 +222,7 @@ fn retime(cause: &LssCause) -> Words {
         LssCause::SilentAfterStore { bit_rate, interface, host } => {
             let new = short(*bit_rate);
             let words = Words::new(format!(
-                "stored and reset, and it does not answer at {new}; the host is at {}",
+                "stored and reset, but the device does not answer at {new}; the host uses {}",
                 short(*host)
             ));
             words.hint(format!("find its bit rate: cangauge bus detect {interface} --active"))

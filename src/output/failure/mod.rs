@@ -164,7 +164,7 @@ impl fmt::Display for ErrorMessage {
 
 impl std::error::Error for ErrorMessage {}
 
-/// The name of a kind in JSON, as the contract lists it.
+/// The name of a kind in JSON.
 pub fn kind_name(kind: Kind) -> &'static str {
     match kind {
         Kind::CheckFailed => "check-failed",
@@ -219,8 +219,8 @@ fn words(failure: &Failure) -> Words {
         Cause::Host(cause) => host::words(cause),
         Cause::Interrupted => Words::new("interrupted"),
         Cause::Expression(error) => below::expression(error),
-        Cause::Unconfirmed(name) => Words::new(format!("no manual page supports the description {name}"))
-            .hint(format!("if it fits, name it: --device {name}")),
+        Cause::Unconfirmed(name) => Words::new(format!("the description {name} is not confirmed by a manual"))
+            .hint(format!("if it is the right description, add: --device {name}")),
         Cause::Read(cause) => read::words(failure, cause),
         Cause::Scan(cause) => scan::words(failure, cause),
         Cause::Nmt(cause) => nmt::words(failure, cause),

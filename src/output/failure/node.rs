@@ -28,7 +28,7 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
             let words = Words::new(format!("{source} has no object \"{}\"", error.name));
             match error.nearest.is_empty() {
                 true => words,
-                false => words.hint(format!("nearest: {}", error.nearest.join(", "))),
+                false => words.hint(format!("similar names: {}", error.nearest.join(", "))),
             }
         }
         Error::Restarted(_) => Words::new("the device restarted"),

@@ -18,7 +18,7 @@ const MAX_LISTED: usize = 16;
 /// The message and the hint for a cause.
 pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
     match cause {
-        PdoFailure::NoTpdo => Words::new("it has no TPDO"),
+        PdoFailure::NoTpdo => Words::new("no TPDO"),
         PdoFailure::Rejected { error, available } => {
             let numbers: Vec<String> = available.iter().map(|number| number.get().to_string()).collect();
             Words::new(error.to_string()).hint(format!("it has the TPDOs {}", numbers.join(", ")))
@@ -59,7 +59,7 @@ pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
         }
         PdoFailure::UnknownName { name, nearest, signals } => unknown_name(name, nearest, signals),
         PdoFailure::WidthUnknown { object } => {
-            Words::new(format!("the width of {object} is unknown")).hint(format!("state its bits: {object}/32"))
+            Words::new(format!("the width of {object} is unknown")).hint(format!("add the width in bits: {object}/32"))
         }
         PdoFailure::Change { error, write, mappable } => {
             let words = Words::new(step(error, write.as_ref()));
@@ -73,11 +73,11 @@ pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
 }
 
 fn unknown_name(name: &str, nearest: &[String], signals: &[String]) -> Words {
-    let words = Words::new(format!("it has no object or signal \"{name}\""));
+    let words = Words::new(format!("no object or signal \"{name}\""));
     match (nearest, signals) {
         ([], []) => words,
         ([], signals) => words.hint(format!("its signals: {}", signals.join(", "))),
-        (nearest, _) => words.hint(format!("nearest: {}", nearest.join(", "))),
+        (nearest, _) => words.hint(format!("similar names: {}", nearest.join(", "))),
     }
 }
 
@@ -167,7 +167,9 @@ fn incomplete_text(node: &str, incomplete: &Incomplete) -> NoteText {
     let Incomplete { last, restore, previous, needs_preop, was_operational } = incomplete;
     let tpdo = previous.number;
     let mut message = match last {
-        Some(write) => format!("{tpdo} is only partly changed, after {} ({})", write.object, number(write)),
+        Some(write) => {
+            format!("{tpdo} is only partly changed; the last confirmed write was {} ({})", write.object, number(write))
+        }
         None => format!("it is unknown whether {tpdo} was changed: no step was confirmed"),
     };
     if let Some((error, write)) = restore {
@@ -208,8 +210,7 @@ pub(in crate::output) fn fact(fact: &PdoFact) -> NoteText {
         PdoFact::OnlyOnChange { number } => NoteText::new(
             "only-on-change",
             format!(
-                "the event timer of {number} is 0: it is sent only if a value changes by its delta (x133h) or passes a \
-                 limit"
+                "{number} is sent only if a value changes by its delta (x133h) or crosses a limit: its event timer is 0"
             ),
         ),
         PdoFact::TimerUnused { transmission } => {

@@ -76,7 +76,7 @@ pub(in crate::output) fn effect(node: &str, effect: &StoreEffect) -> NoteText {
         StoreEffect::Stored(groups) => NoteText::new("stored", format!("stored: {}", Group::names(groups))),
         StoreEffect::NotVerified(verb) => NoteText::new(
             "not-verified",
-            format!("the device acknowledged the {}, and it is not verified", name(*verb)),
+            format!("the device acknowledged the {}; the result was not verified", name(*verb)),
         ),
     }
 }
@@ -93,7 +93,7 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> NoteTex
             NoteText::new(
                 "instead-of-all",
                 format!(
-                    "comm and app are stored instead of all, which would reset these to their defaults: {}",
+                    "stored comm and app, because storing all would reset these COB-IDs: {}",
                     list(cob_ids, cob_id)
                 ),
             )
@@ -123,8 +123,8 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> NoteTex
         StoreFact::Unchanged(settings) => NoteText::new(
             "unchanged",
             format!(
-                "the device was reset; these settings did not change and are not the usual defaults: either the \
-                 factory set them, or they were not restored: {}",
+                "these settings did not change at the reset and are not the usual defaults (set at the factory, or \
+                 not restored): {}",
                 list(settings, with_value)
             ),
         ),

@@ -2,7 +2,7 @@
 //! reception of frames.
 
 use super::series::Series;
-use super::target::{FileChange, HeaderPlace, Target, TargetWriter, WriteFailure};
+use super::target::{FileChange, HeaderPlace, OutputTarget, TargetWriter, WriteFailure};
 use std::collections::VecDeque;
 use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -44,9 +44,9 @@ impl Job {
 
     fn run(&self, writer: &mut TargetWriter) -> Result<(), WriteFailure> {
         match self {
-            Job::Header { place, bytes } => writer.header(*place, bytes),
+            Job::Header { place, bytes } => writer.set_header(*place, bytes),
             Job::Rows { bytes, .. } if bytes.is_empty() => writer.check_file().map_err(|error| (error, 0)),
-            Job::Rows { bytes, rows } => writer.rows(bytes, *rows),
+            Job::Rows { bytes, rows } => writer.write_rows(bytes, *rows),
         }
     }
 }
@@ -128,7 +128,7 @@ impl Queue {
 
 impl LineWriter {
     /// Writes each block before the call returns: for a bus that waits.
-    pub fn direct(target: Target, series: Option<Series>) -> LineWriter {
+    pub fn direct(target: OutputTarget, series: Option<Series>) -> LineWriter {
         LineWriter(Inner::Direct { writer: TargetWriter::new(target, series), has_failed: false, lost: 0 })
     }
 
@@ -136,7 +136,7 @@ impl LineWriter {
     ///
     /// # Errors
     /// The thread cannot be started.
-    pub fn queued(target: Target, series: Option<Series>, capacity: usize) -> io::Result<LineWriter> {
+    pub fn queued(target: OutputTarget, series: Option<Series>, capacity: usize) -> io::Result<LineWriter> {
         let queue = Arc::new(Queue::default());
         let shared = Arc::clone(&queue);
         let writer = TargetWriter::new(target, series);
@@ -167,7 +167,7 @@ impl LineWriter {
         }
         if let Inner::Direct { writer, has_failed: has_failed @ false, lost } = &mut self.0 {
             // The caller uses the same block again: no allocation.
-            let result = writer.rows(block, rows);
+            let result = writer.write_rows(block, rows);
             block.clear();
             return result.map_err(|(error, lost_rows)| {
                 *has_failed = true;
@@ -306,9 +306,9 @@ mod tests {
         }
     }
 
-    fn gate() -> (Target, Sender<()>, Receiver<String>) {
+    fn gate() -> (OutputTarget, Sender<()>, Receiver<String>) {
         let ((go, gone), (written, read)) = (channel(), channel());
-        (Target::Stream(Box::new(Gate { go: gone, written })), go, read)
+        (OutputTarget::Stream(Box::new(Gate { go: gone, written })), go, read)
     }
 
     fn put(writer: &mut LineWriter, text: &str) -> io::Result<()> {
@@ -319,7 +319,7 @@ mod tests {
     #[test]
     fn full_disk_keeps_whole_lines_and_counts_lost_rows() {
         for queued in [false, true] {
-            let target = Target::Stream(Box::new(SmallDisk(9)));
+            let target = OutputTarget::Stream(Box::new(SmallDisk(9)));
             let mut writer = if queued {
                 LineWriter::queued(target, None, 1000).expect("a thread")
             } else {

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 /// Where lines are written.
 #[derive(Debug)]
-pub enum Target {
+pub enum OutputTarget {
     /// A file. A regular file keeps its first `keep` bytes; the first line replaces the rest.
     File {
         /// Open for appending.
@@ -52,10 +52,10 @@ pub(super) enum HeaderPlace {
 /// A failed write, and how many rows were lost with it.
 pub(super) type WriteFailure = (io::Error, u64);
 
-/// Writes lines to a target, and to the files of a series after it.
+/// Writes lines to a target. With a series, later lines go to further files.
 #[derive(Debug)]
 pub(super) struct TargetWriter {
-    target: Target,
+    target: OutputTarget,
     series: Option<Series>,
     is_prepared: bool,
     /// The lines before the first row.
@@ -67,7 +67,7 @@ pub(super) struct TargetWriter {
 }
 
 impl TargetWriter {
-    pub(super) fn new(target: Target, series: Option<Series>) -> TargetWriter {
+    pub(super) fn new(target: OutputTarget, series: Option<Series>) -> TargetWriter {
         TargetWriter {
             target,
             series,
@@ -79,8 +79,8 @@ impl TargetWriter {
         }
     }
 
-    /// Takes the lines before the first row.
-    pub(super) fn header(&mut self, place: HeaderPlace, bytes: &[u8]) -> Result<(), WriteFailure> {
+    /// Sets the header, and writes it unless it is already present.
+    pub(super) fn set_header(&mut self, place: HeaderPlace, bytes: &[u8]) -> Result<(), WriteFailure> {
         self.header = bytes.to_vec();
         if place == HeaderPlace::Present {
             return Ok(());
@@ -88,10 +88,10 @@ impl TargetWriter {
         self.prepare().map_err(|error| (error, 0))?;
         if let (HeaderPlace::NextFile, Some(series)) = (place, &mut self.series) {
             let (path, file) = series.create().map_err(|error| (error, 0))?;
-            self.target = Target::File { file, path, keep: 0 };
+            self.target = OutputTarget::File { file, path, keep: 0 };
             (self.length, self.name_change) = (0, None);
         }
-        self.rows(bytes, 0)
+        self.write_rows(bytes, 0)
     }
 
     /// Changes of the files by other programs since the last call.
@@ -100,7 +100,7 @@ impl TargetWriter {
     }
 
     /// Writes whole lines. After a failure the file ends with a whole line.
-    pub(super) fn rows(&mut self, bytes: &[u8], rows: u64) -> Result<(), WriteFailure> {
+    pub(super) fn write_rows(&mut self, bytes: &[u8], rows: u64) -> Result<(), WriteFailure> {
         self.prepare().map_err(|error| (error, rows))?;
         self.check_file().map_err(|error| (error, rows))?;
         self.length += bytes.len() as u64;
@@ -118,7 +118,7 @@ impl TargetWriter {
         if let Some(series) = &mut self.series {
             series.repair_last()?;
         }
-        if let Target::File { file, keep, .. } = &mut self.target
+        if let OutputTarget::File { file, keep, .. } = &mut self.target
             && file.metadata()?.is_file()
         {
             file.set_len(*keep)?;
@@ -130,7 +130,7 @@ impl TargetWriter {
     /// Detects changes of the file by other programs since the last write. A file that became shorter gets its header
     /// again.
     pub(super) fn check_file(&mut self) -> io::Result<()> {
-        let Target::File { file, path, .. } = &self.target else { return Ok(()) };
+        let OutputTarget::File { file, path, .. } = &self.target else { return Ok(()) };
         let metadata = file.metadata()?;
         if !self.is_prepared || !metadata.is_file() {
             return Ok(());
@@ -158,12 +158,12 @@ impl TargetWriter {
 }
 
 /// Writes all of `bytes`. The error comes with the number of bytes that were kept: whole lines.
-fn write_lines(target: &mut Target, bytes: &[u8]) -> Result<(), (io::Error, usize)> {
+fn write_lines(target: &mut OutputTarget, bytes: &[u8]) -> Result<(), (io::Error, usize)> {
     let mut done = 0;
     while done < bytes.len() {
         let result = match target {
-            Target::File { file, .. } => file.write(&bytes[done..]),
-            Target::Stream(stream) => stream.write(&bytes[done..]),
+            OutputTarget::File { file, .. } => file.write(&bytes[done..]),
+            OutputTarget::Stream(stream) => stream.write(&bytes[done..]),
         };
         match result {
             Ok(0) => return Err((io::ErrorKind::WriteZero.into(), cut_partial_line(target, bytes, done))),
@@ -172,16 +172,16 @@ fn write_lines(target: &mut Target, bytes: &[u8]) -> Result<(), (io::Error, usiz
             Err(error) => return Err((error, cut_partial_line(target, bytes, done))),
         }
     }
-    if let Target::Stream(stream) = target {
+    if let OutputTarget::Stream(stream) = target {
         stream.flush().map_err(|error| (error, bytes.len()))?;
     }
     Ok(())
 }
 
 /// Cuts a file back to its last whole line. `done` of `bytes` were written; returns how many of them are kept.
-fn cut_partial_line(target: &mut Target, bytes: &[u8], done: usize) -> usize {
+fn cut_partial_line(target: &mut OutputTarget, bytes: &[u8], done: usize) -> usize {
     let whole = bytes[..done].iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-    if let Target::File { file, .. } = target {
+    if let OutputTarget::File { file, .. } = target {
         let excess = (done - whole) as u64;
         if let Ok(metadata) = file.metadata()
             && metadata.is_file()
@@ -202,7 +202,7 @@ mod tests {
     fn a_partial_row_is_removed() {
         let mut file = tempfile::tempfile().expect("a file");
         file.write_all(b"head\naaa\nbb").expect("written");
-        let mut target = Target::File { file: file.try_clone().expect("a file"), path: PathBuf::new(), keep: 0 };
+        let mut target = OutputTarget::File { file: file.try_clone().expect("a file"), path: PathBuf::new(), keep: 0 };
         assert_eq!(cut_partial_line(&mut target, b"aaa\nbbb\n", 6), 4);
         assert_eq!(file.metadata().expect("a file").len(), 9, "header and the first row");
         assert_eq!(cut_partial_line(&mut target, b"ccc\n", 0), 0);
@@ -211,7 +211,7 @@ mod tests {
 
     fn writer(path: &std::path::Path) -> TargetWriter {
         let file = File::options().append(true).create(true).open(path).expect("a file");
-        TargetWriter::new(Target::File { file, path: path.to_owned(), keep: 0 }, None)
+        TargetWriter::new(OutputTarget::File { file, path: path.to_owned(), keep: 0 }, None)
     }
 
     #[test]
@@ -220,19 +220,19 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("run.csv");
         let mut writer = writer(&path);
-        writer.header(HeaderPlace::Present, b"head\n").expect("taken");
-        writer.rows(b"head\naaa\nbbb\n", 2).expect("written");
+        writer.set_header(HeaderPlace::Present, b"head\n").expect("taken");
+        writer.write_rows(b"head\naaa\nbbb\n", 2).expect("written");
         let file = File::options().write(true).open(&path).expect("a file");
         file.set_len(0).expect("truncated");
-        writer.rows(b"ccc\n", 1).expect("written");
+        writer.write_rows(b"ccc\n", 1).expect("written");
         assert_eq!(std::fs::read_to_string(&path).expect("read"), "head\nccc\n");
         file.set_len(7).expect("truncated");
-        writer.rows(b"ddd\n", 1).expect("written");
+        writer.write_rows(b"ddd\n", 1).expect("written");
         assert_eq!(std::fs::read_to_string(&path).expect("read"), "head\ncc\nhead\nddd\n");
         assert_eq!(writer.take_changes(), vec![FileChange::Shortened(path.clone()); 2]);
         // A file that became longer is continued at its end.
         std::fs::write(&path, "a much longer text of another program\n").expect("written");
-        writer.rows(b"eee\n", 1).expect("written");
+        writer.write_rows(b"eee\n", 1).expect("written");
         assert_eq!(std::fs::read_to_string(&path).expect("read"), "a much longer text of another program\neee\n");
         assert_eq!(writer.take_changes(), []);
     }
@@ -243,10 +243,10 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let [path, old] = ["run.csv", "run.old"].map(|name| folder.path().join(name));
         let mut writer = writer(&path);
-        writer.rows(b"aaa\n", 1).expect("written");
+        writer.write_rows(b"aaa\n", 1).expect("written");
         std::fs::rename(&path, &old).expect("moved");
-        writer.rows(b"bbb\n", 1).expect("written");
-        writer.rows(b"ccc\n", 1).expect("written");
+        writer.write_rows(b"bbb\n", 1).expect("written");
+        writer.write_rows(b"ccc\n", 1).expect("written");
         assert_eq!(std::fs::read_to_string(&old).expect("read"), "aaa\nbbb\nccc\n");
         std::fs::remove_file(&old).expect("deleted");
         writer.check_file().expect("no error");

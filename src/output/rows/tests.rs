@@ -31,7 +31,7 @@ impl Shared {
 
 fn stream(setup: Setup) -> (Shared, Rows) {
     let shared = Shared::default();
-    let writer = LineWriter::direct(Target::Stream(Box::new(shared.clone())), None);
+    let writer = LineWriter::direct(OutputTarget::Stream(Box::new(shared.clone())), None);
     (shared, Rows::new(writer, setup))
 }
 
@@ -146,8 +146,10 @@ fn rotated(rotation: Rotation, count: u64) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let base = folder.path().join("run.csv");
     let file = fs::File::create(Series::name(&base, 1)).expect("created");
-    let writer =
-        LineWriter::direct(Target::File { file, path: base.clone(), keep: 0 }, Some(Series::new(&base, 2, false)));
+    let writer = LineWriter::direct(
+        OutputTarget::File { file, path: base.clone(), keep: 0 },
+        Some(Series::new(&base, 2, false)),
+    );
     let mut rows = Rows::new(writer, Setup { rotation: Some(rotation), has_series: true, ..Setup::default() });
     for number in 0..count {
         let row = sample(number * 250_000, Some(Number::Decimal { mantissa: number.into(), digits: 0 }), None, &[]);
@@ -195,8 +197,10 @@ fn continued_file_keeps_its_whole_lines() {
     let existing = existing_lines(&mut file).expect("read").expect("lines");
     let setup = Setup { existing_header: Some(existing.header), continues: true, ..Setup::default() };
     assert_eq!(setup.check_long(), Ok(()));
-    let mut rows =
-        Rows::new(LineWriter::direct(Target::File { file, path: path.clone(), keep: existing.length }, None), setup);
+    let mut rows = Rows::new(
+        LineWriter::direct(OutputTarget::File { file, path: path.clone(), keep: existing.length }, None),
+        setup,
+    );
     assert_eq!(fs::read_to_string(&path).expect("read").len(), 48 + 1 + 4 + 3, "nothing before the first row");
     rows.put(None, &[three()[1].0.clone()], &[source("pressure", "bar")]).expect("written");
     rows.finish(&mut || false).expect("written");

@@ -17,7 +17,7 @@ fn refusal(bench: Result<Bench, BenchError>) -> String {
 }
 
 #[test]
-fn plain_sim_is_the_bench_of_the_contract() {
+fn plain_sim_has_the_default_bench() {
     let bench = Bench::parse("").expect("the default");
     assert_eq!(nodes(&bench), [1, 2, 3, 127]);
     assert_eq!((bench.clock(), bench.bit_rate), (Clock::Real, 250_000));

@@ -1,6 +1,6 @@
 //! The objects that set the zero of a channel: signature, offset, measuring range. From the description or CiA 404.
 
-use super::Action;
+use super::ZeroTarget;
 use super::failure::AutozeroFailure;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
@@ -62,7 +62,7 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
     let entry = match (number, described) {
         (None, [only]) => only,
         (None, _) => {
-            return Err(fail(AutozeroFailure::WhichChannel { action: Action::Autozero, available: available() }));
+            return Err(fail(AutozeroFailure::WhichChannel { target: ZeroTarget::Autozero, available: available() }));
         }
         (Some(number), _) => described.iter().find(|entry| entry.channel == number).ok_or_else(|| {
             fail(AutozeroFailure::NoSuchChannel { title: title.clone(), channel: number, available: available() })
@@ -94,7 +94,7 @@ pub(super) fn tare(master: &mut Master<'_>, device: &mut Node, number: Option<u8
     let (signal, object, net) = match (number, candidates.as_slice()) {
         (_, []) => return Err(fail(AutozeroFailure::NoTare)),
         (None, [only]) => *only,
-        (None, _) => return Err(fail(AutozeroFailure::WhichChannel { action: Action::Tare, available })),
+        (None, _) => return Err(fail(AutozeroFailure::WhichChannel { target: ZeroTarget::Tare, available })),
         (Some(number), _) => {
             let found = candidates.iter().find(|(signal, ..)| signal.channel == number);
             *found.ok_or_else(|| fail(AutozeroFailure::NoTareOfChannel { channel: number, available }))?
@@ -102,7 +102,7 @@ pub(super) fn tare(master: &mut Master<'_>, device: &mut Node, number: Option<u8
     };
     let signature = device.described(object).and_then(|entry| entry.signature).unwrap_or(Signature::Tare);
     let offsets: Vec<ObjectId> = layout.find_in_family(signal, 0x138).into_iter().collect();
-    let signal = Signal { value: (net, layout.data_type(net)), ..signal.clone() };
+    let signal = Signal { value_object: (net, layout.data_type(net)), ..signal.clone() };
     let range = range(master, device, &signal, None)?;
     device.signals.iter_mut().filter(|known| known.name == signal.name).for_each(|known| *known = signal.clone());
     Ok(Channel {
@@ -126,7 +126,7 @@ fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
         (None, _) => {
             return Err(Failure::at(
                 node,
-                AutozeroFailure::WhichChannel { action: Action::Autozero, available: Vec::new() },
+                AutozeroFailure::WhichChannel { target: ZeroTarget::Autozero, available: Vec::new() },
             ));
         }
     }
@@ -143,7 +143,7 @@ fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
         Ok(_) | Err(SdoError { failure: SdoFailure::Refused(_), .. }) => {}
         Err(error) => return Err(error.into()),
     }
-    let family = signal.value.0.index & 0xf000;
+    let family = signal.value_object.0.index & 0xf000;
     let offsets = [0x6127, family | 0x124].map(|index| ObjectId::new(index, signal.channel)).to_vec();
     let range = range(master, device, &signal, None)?;
     let signature = b"zero".to_vec();
@@ -224,7 +224,7 @@ fn range(
     }
     let description = device.model.as_ref().map(|model| &model.description);
     let entry = description.and_then(|known| known.signals.iter().find(|entry| entry.channel == signal.channel));
-    let family = signal.value.0.index & 0xf000;
+    let family = signal.value_object.0.index & 0xf000;
     let [start, end] = match entry {
         Some(entry) => [entry.span_start, entry.span_end],
         None => [0x148, 0x149].map(|index| Some(ObjectId::new(family | index, signal.channel))),

@@ -1,6 +1,6 @@
 //! Causes, effects and notes: a channel was not set to zero, and what to report about a zero that was set.
 
-use super::Action;
+use super::ZeroTarget;
 use super::channel::Offset;
 use super::safety::Objection;
 use crate::canopen::object::ObjectId;
@@ -42,7 +42,7 @@ pub enum AutozeroFailure {
     /// The device has several channels, and none was chosen.
     WhichChannel {
         /// What is set to zero.
-        action: Action,
+        target: ZeroTarget,
         /// The channels that have one; empty if they are unknown.
         available: Vec<u8>,
     },
@@ -88,7 +88,7 @@ pub enum AutozeroFailure {
     /// A safety check stopped it.
     Unsafe {
         /// What is set to zero.
-        action: Action,
+        target: ZeroTarget,
         /// The reason.
         objection: Objection,
         /// The channel, if the user chose one.
@@ -208,6 +208,15 @@ impl Undo {
     }
 }
 
+/// What proves that the device executed a signature without an acknowledgement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Proof {
+    /// The offset changed.
+    Offset,
+    /// The reading changed to zero.
+    Reading,
+}
+
 /// A note about a zero that was set.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AutozeroFact {
@@ -215,11 +224,8 @@ pub enum AutozeroFact {
     Forced(Objection),
     /// Nothing was changed, because it was a dry run.
     NothingChanged,
-    /// No answer came to the signature. The offset, else the reading, proves that the device acted on it.
-    ProvedBy {
-        /// Whether the offset is the proof.
-        offset: bool,
-    },
+    /// The device did not acknowledge the signature, but this proves that it executed the signature.
+    ProvedBy(Proof),
     /// How to undo it.
     Undo(Undo),
     /// The zero is not stored.

@@ -266,7 +266,7 @@ impl Catalog<'_> {
         if !is_404 || !(0x6000..0xa000).contains(&object.index) {
             return None;
         }
-        let own = self.node.signals[signal].value.0.index & 0xf000;
+        let own = self.node.signals[signal].value_object.0.index & 0xf000;
         let families = [own, 0x6000, 0x9000, 0x8000, 0x7000];
         let first = families.into_iter().find(|family| self.present.contains(&ObjectId::new(family | low, object.sub)));
         (first == Some(object.index & 0xf000)).then_some((signal, name, stage))

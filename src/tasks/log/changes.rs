@@ -98,5 +98,5 @@ fn signal_change(signal: &Signal, old: &Signal) -> Option<Change> {
     if signal.digits != old.digits {
         return Some(Change::Digits(name, old.digits, signal.digits));
     }
-    (signal.value != old.value).then_some(Change::Type(name))
+    (signal.value_object != old.value_object).then_some(Change::Type(name))
 }

@@ -168,7 +168,7 @@ impl SetupListener {
     fn with_unit(&self, node: &Node, mut signal: Signal) -> Signal {
         let [unit, digits] = signals::unit_and_digits(node, &signal);
         let unit = unit.and_then(|object| self.number(node.id, object)).map(Unit);
-        signal.unit = unit.or(signal.unit).or_else(|| node.fixed_unit(signal.value.0));
+        signal.unit = unit.or(signal.unit).or_else(|| node.fixed_unit(signal.value_object.0));
         signal.digits = digits.and_then(|object| self.byte(node.id, object));
         if let Some(step) = signals::step(node, &signal) {
             let data_type = node.layout().data_type(step.object);

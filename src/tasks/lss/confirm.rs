@@ -33,7 +33,7 @@ pub enum Confirmed {
 }
 
 impl Confirmed {
-    /// The word of the contract.
+    /// The word in JSON and tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Confirmed::BootUp => "boot-up",

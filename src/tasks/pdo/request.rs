@@ -211,11 +211,11 @@ fn unknown_name(node: &Node, name: &str) -> PdoFailure {
 /// The object of a signal to map: its process value, unless according to the description only another object with the
 /// same value can be mapped.
 fn value_object(node: &Node, signal: &Signal) -> ObjectId {
-    let value = signal.value.0;
+    let value = signal.value_object.0;
     let Some(model) = &node.model else { return value };
     let mappable = |object: &ObjectId| model.dictionary.get(*object).is_some_and(|entry| entry.pdo);
     let families = PROCESS_VALUES.iter().map(|&(index, _)| ObjectId::new(index, signal.channel));
-    let others = signal.also.iter().copied().chain(families);
+    let others = signal.other_objects.iter().copied().chain(families);
     match model.dictionary.get(value) {
         Some(entry) if !entry.pdo => others.into_iter().find(mappable).unwrap_or(value),
         _ => value,

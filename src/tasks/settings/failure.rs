@@ -1,6 +1,6 @@
 //! Causes of failures, effects and facts: a setting could not be shown or changed.
 
-use super::Quantity;
+use super::ValueWithUnit;
 use super::filter::FilterType;
 use super::limits::Limit;
 use crate::canopen::object::ObjectId;
@@ -185,7 +185,7 @@ pub enum SettingsFact {
         /// The name of the object.
         name: String,
         /// Its value now.
-        now: Option<Quantity>,
+        now: Option<ValueWithUnit>,
     },
     /// The device acknowledged the damping, and the filter constant did not change.
     DampingNotShown {

@@ -2,7 +2,7 @@
 
 use super::errors::{Errors, read as read_errors};
 use super::limits::Limit;
-use super::{Quantity, SettingsFailure, page};
+use super::{SettingsFailure, ValueWithUnit, page};
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
@@ -81,7 +81,7 @@ pub enum Meaning {
     /// Nothing else is known.
     Plain,
     /// A number in the unit of its signal.
-    Quantity(Quantity),
+    Quantity(ValueWithUnit),
     /// The code of a unit.
     Unit(Unit),
     /// A number with this unit, or a code with this word. Both are from the description or CiA 404.
@@ -113,7 +113,7 @@ pub struct Channel {
     /// The present value; `None` if it cannot be read.
     pub sample: Option<Sample>,
     /// Start and end of the measuring range.
-    pub range: Option<(Quantity, Quantity)>,
+    pub range: Option<(ValueWithUnit, ValueWithUnit)>,
     /// The objects of this channel.
     pub settings: Vec<Setting>,
 }
@@ -251,7 +251,7 @@ fn of_channel(node: &Node, signal: &Signal) -> Vec<ObjectId> {
     }
     let at = |index: u16| ObjectId::new(index, signal.channel);
     let described = node.model.as_ref().is_some_and(|model| !model.dictionary.is_empty());
-    let own = signal.value.0.index & 0xf000;
+    let own = signal.value_object.0.index & 0xf000;
     let scaling = [0x6000, 0x7000, 0x8000, 0x9000].into_iter().filter(|&family| described || family == own);
     let scaling = SCALING.into_iter().flat_map(|low| scaling.clone().map(move |family| at(family | low)));
     let mut objects: Vec<ObjectId> = [0x6110, 0x6112, 0x6114].map(at).to_vec();
@@ -263,7 +263,7 @@ fn of_channel(node: &Node, signal: &Signal) -> Vec<ObjectId> {
     let numbered = numbered.filter(|entry| entry.numbered && entry.object.sub == signal.channel);
     objects.extend(numbered.map(|entry| entry.object).filter(|object| page::is_own(*object)));
     objects.extend(["minimum-pv", "maximum-pv"].into_iter().filter_map(|name| node.object_of(signal, name)));
-    let mut seen: BTreeSet<ObjectId> = signal.also.iter().copied().collect();
+    let mut seen: BTreeSet<ObjectId> = signal.other_objects.iter().copied().collect();
     objects.retain(|&object| {
         let readable = node.entry(object).is_none_or(|entry| entry.access.is_readable());
         node.may_have(object) && readable && seen.insert(object)
@@ -275,7 +275,7 @@ fn of_channel(node: &Node, signal: &Signal) -> Vec<ObjectId> {
 /// of its profile, from the EDS or the profile.
 fn own(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
     let taken: BTreeSet<ObjectId> = channels.iter().flatten().copied().collect();
-    let values = node.signals.iter().flat_map(|signal| signal.also.iter().copied());
+    let values = node.signals.iter().flat_map(|signal| signal.other_objects.iter().copied());
     let startup = communication(node).into_iter();
     let dates = [page::CALIBRATED, page::PRODUCED].into_iter().filter_map(|parts| page::date_objects(node, parts));
     let taken: BTreeSet<ObjectId> = taken.into_iter().chain(values).chain(startup).chain(dates.flatten()).collect();
@@ -294,7 +294,7 @@ fn own(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
         let objects = node.identity.profile().into_iter().flat_map(profiles::settings_of);
         own.extend(objects);
     }
-    let signals: BTreeSet<ObjectId> = node.signals.iter().map(|signal| signal.value.0).collect();
+    let signals: BTreeSet<ObjectId> = node.signals.iter().map(|signal| signal.value_object.0).collect();
     own.retain(|object| !signals.contains(object));
     own
 }
@@ -304,7 +304,7 @@ fn span(node: &Node, signal: &Signal) -> [ObjectId; 2] {
     let described = node.model.as_ref().map_or(&[][..], |model| &model.description.signals);
     let entry = described.iter().find(|entry| entry.name == signal.name);
     if !signal.has_channel() && entry.is_none() {
-        return [signal.value.0; 2];
+        return [signal.value_object.0; 2];
     }
     let start = entry.and_then(|entry| entry.span_start).unwrap_or_else(|| node.in_family(signal, 0x148));
     let end = entry.and_then(|entry| entry.span_end).unwrap_or_else(|| node.in_family(signal, 0x149));

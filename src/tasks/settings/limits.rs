@@ -2,7 +2,7 @@
 //! family of the process value).
 
 use super::{
-    Quantity, SettingsEffect, SettingsFact, SettingsFailure, encode_quantity, find_signal, quantity, read_each,
+    SettingsEffect, SettingsFact, SettingsFailure, ValueWithUnit, encode_quantity, find_signal, quantity, read_each,
     set_object,
 };
 use crate::canopen::id::NodeId;
@@ -60,7 +60,7 @@ pub struct Limits {
     /// `pressure`, `ch1` …
     pub signal: String,
     /// The settings that the device has, with their objects.
-    pub values: Vec<(Limit, ObjectId, Quantity)>,
+    pub values: Vec<(Limit, ObjectId, ValueWithUnit)>,
     /// TPDOs that may never be sent because the delta is 0.
     pub silent: Vec<String>,
     /// Further notes.
@@ -84,7 +84,7 @@ pub fn show(master: &mut Master<'_>, node: &Node, signal: &str) -> Result<Limits
         .filter(|&(_, object)| node.may_have(object))
         .collect();
     let objects: Vec<ObjectId> = wanted.iter().map(|&(_, object)| object).collect();
-    let values: Vec<(Limit, ObjectId, Quantity)> = wanted
+    let values: Vec<(Limit, ObjectId, ValueWithUnit)> = wanted
         .into_iter()
         .zip(read_each(master, node, &objects)?)
         .filter_map(|((limit, object), value)| Some((limit, object, quantity(signal, &value?)?)))
@@ -187,7 +187,7 @@ fn limit_write(
 }
 
 /// The TPDOs that carry the signal and are sent only on events, while the delta is 0.
-fn silent(node: &Node, signal: &Signal, values: &[(Limit, ObjectId, Quantity)]) -> Vec<String> {
+fn silent(node: &Node, signal: &Signal, values: &[(Limit, ObjectId, ValueWithUnit)]) -> Vec<String> {
     let delta = values.iter().find(|(limit, ..)| *limit == Limit::Delta);
     if delta.is_none_or(|(_, _, quantity)| quantity.number.as_f64() != 0.0) {
         return Vec::new();

@@ -1,7 +1,7 @@
 //! The lowest and the highest value that a device has measured, and their reset (MH-4 2020h to 2022h, D-20-9 2020h and
 //! 2021h). The objects are found by their names in the description.
 
-use super::{Quantity, SettingsFailure, find_signal, quantity, read_each};
+use super::{SettingsFailure, ValueWithUnit, find_signal, quantity, read_each};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
@@ -28,9 +28,9 @@ pub struct Extremes {
     /// `pressure`, `temperature` …
     pub signal: String,
     /// The lowest value since the device was switched on or reset; `None` if it cannot be read.
-    pub lowest: Option<Quantity>,
+    pub lowest: Option<ValueWithUnit>,
     /// The highest value.
-    pub highest: Option<Quantity>,
+    pub highest: Option<ValueWithUnit>,
 }
 
 /// The lowest and the highest value of every signal that has them.
@@ -127,8 +127,8 @@ mod tests {
         let range = |lowest, highest| Extremes {
             node: NodeId::MIN,
             signal: "pressure".to_owned(),
-            lowest: Some(Quantity { number: Number::Real64(lowest), unit: None }),
-            highest: Some(Quantity { number: Number::Real64(highest), unit: None }),
+            lowest: Some(ValueWithUnit { number: Number::Real64(lowest), unit: None }),
+            highest: Some(ValueWithUnit { number: Number::Real64(highest), unit: None }),
         };
         let old = range(1.0, 2.0);
         assert_eq!(is_reset(&old, &range(1.5, 1.5)), Some(true));

@@ -1,4 +1,4 @@
-//! The settings of one device by name: unit, filter, limits, minimum and maximum, errors, and all of them on one page.
+//! Reads and writes named settings of a device: unit, filter, limits, extreme values, errors.
 
 pub mod errors;
 mod failure;
@@ -28,7 +28,7 @@ use crate::tasks::read::ReadFailure;
 
 /// A number in the unit of a signal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Quantity {
+pub struct ValueWithUnit {
     /// The number; an integer is scaled with the decimal digits of the device.
     pub number: Number,
     /// The unit; `None` if it is unknown.
@@ -63,30 +63,30 @@ pub fn find_signal<'a>(node: &'a Node, name: Option<&str>) -> Result<&'a Signal,
     }
 }
 
-/// The names of the signals that `text` selects: one name, a list (`ch1,ch3`), a range (`ch1-ch4`, `ch1-4`), or `all`.
-/// `all` means the signals that the setting `applies` to, if there is one.
+/// The names of the signals that `text` selects: one name, a list (`ch1,ch3`), a range (`ch1-ch4`, `ch1-4`), or
+/// `all`. `all` selects the signals for which `is_selected` is true; if there are none, all signals.
 ///
 /// # Errors
 /// The node has no such signal; [`SettingsFailure::NoChannel`].
-pub fn select(node: &Node, text: &str, applies: impl Fn(&Signal) -> bool) -> Result<Vec<String>, Failure> {
+pub fn select_signals(node: &Node, text: &str, is_selected: impl Fn(&Signal) -> bool) -> Result<Vec<String>, Failure> {
     let channels = node.channels();
-    let place = |name: &str| channels.iter().position(|signal| signal.name == name);
+    let position = |name: &str| channels.iter().position(|signal| signal.name == name);
     let range = |item: &str| {
         item.match_indices('-').find_map(|(at, _)| {
             let (first, last) = (&item[..at], &item[at + 1..]);
             let prefix = first.trim_end_matches(|c: char| c.is_ascii_digit());
-            let (first, last) = (place(first)?, place(last).or_else(|| place(&format!("{prefix}{last}")))?);
+            let (first, last) = (position(first)?, position(last).or_else(|| position(&format!("{prefix}{last}")))?);
             (first <= last).then_some(first..=last)
         })
     };
     let mut names: Vec<String> = Vec::new();
     for item in text.split(',') {
         let found: Vec<&Signal> = match range(item) {
-            _ if place(item).is_none() && item == "all" && channels.iter().any(|signal| applies(signal)) => {
-                channels.iter().copied().filter(|signal| applies(signal)).collect()
+            _ if position(item).is_none() && item == "all" && channels.iter().any(|signal| is_selected(signal)) => {
+                channels.iter().copied().filter(|signal| is_selected(signal)).collect()
             }
-            _ if place(item).is_none() && item == "all" => channels.clone(),
-            Some(range) if place(item).is_none() => channels[range].to_vec(),
+            _ if position(item).is_none() && item == "all" => channels.clone(),
+            Some(range) if position(item).is_none() => channels[range].to_vec(),
             _ => vec![find_signal(node, Some(item))?],
         };
         for signal in found {
@@ -116,19 +116,18 @@ fn set_object(master: &mut Master<'_>, node: &Node, object: ObjectId, data: &[u8
 }
 
 /// A value of an object in the unit of its signal; `None` if it is not a finite number.
-fn quantity(signal: &Signal, value: &Value) -> Option<Quantity> {
+fn quantity(signal: &Signal, value: &Value) -> Option<ValueWithUnit> {
     let number = Number::from_value(value, signal.digits.unwrap_or(0)).filter(|number| number.as_f64().is_finite())?;
-    Some(Quantity { number, unit: signal.unit })
+    Some(ValueWithUnit { number, unit: signal.unit })
 }
 
-/// The same for an object that may be the measured value; `None` if the value is the marker of an overload.
-fn measured(node: &Node, signal: &Signal, object: ObjectId, value: &Value) -> Option<Quantity> {
-    let is_marker = signal.marker && signal.is_value(object) && is_smallest(value, node.data_type(object));
+/// Like [`quantity`], but `None` if `object` is the process value and contains the overload marker.
+fn measured_quantity(node: &Node, signal: &Signal, object: ObjectId, value: &Value) -> Option<ValueWithUnit> {
+    let is_marker = signal.has_marker && signal.is_value(object) && is_smallest(value, node.data_type(object));
     quantity(signal, value).filter(|_| !is_marker)
 }
 
-/// The bytes of a number in the unit of a signal. An integer object counts in steps of the last of its `digits` decimal
-/// digits.
+/// The bytes of a number in the unit of a signal. For integer types, the number is multiplied by 10^`digits`.
 pub(super) fn encode_quantity(number: f64, data_type: DataType, digits: u8) -> Result<Vec<u8>, QuantityError> {
     let text = match data_type {
         DataType::Real32 | DataType::Real64 => number.to_string(),

@@ -1,7 +1,7 @@
 //! Values of the page of `info`: meanings, dates, ranges, stored settings.
 
 use super::info::{Date, Meaning, Store};
-use super::{Quantity, filter, quantity};
+use super::{ValueWithUnit, filter, quantity};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::device::description::{Access, Signature};
@@ -89,7 +89,7 @@ pub(super) fn range(
     values: &BTreeMap<ObjectId, Value>,
     signal: &Signal,
     [start, end]: [ObjectId; 2],
-) -> Option<(Quantity, Quantity)> {
+) -> Option<(ValueWithUnit, ValueWithUnit)> {
     let end_of_range = |object| quantity(signal, values.get(&object)?);
     Some((end_of_range(start)?, end_of_range(end)?))
 }
@@ -131,7 +131,7 @@ pub(super) fn store(node: &Node, values: &BTreeMap<ObjectId, Value>, at: ObjectI
     store
 }
 
-impl std::fmt::Display for Quantity {
+impl std::fmt::Display for ValueWithUnit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let unit = self.unit.map(|unit| unit.to_string()).filter(|unit| !unit.is_empty());
         match unit {

@@ -1,6 +1,6 @@
 //! The physical unit of a signal (6131h), and the objects that a new unit rescales.
 
-use super::{Quantity, SettingsFact, SettingsFailure, find_signal, measured, read_each, set_object};
+use super::{SettingsFact, SettingsFailure, ValueWithUnit, find_signal, measured_quantity, read_each, set_object};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
@@ -48,9 +48,9 @@ pub struct Rescaled {
     /// Its name.
     pub name: String,
     /// Its value in the old unit.
-    pub before: Option<Quantity>,
+    pub before: Option<ValueWithUnit>,
     /// Its value in the new unit.
-    pub after: Option<Quantity>,
+    pub after: Option<ValueWithUnit>,
     /// Whether the device kept the number, so that it means something else now.
     pub stale: bool,
 }
@@ -58,7 +58,7 @@ pub struct Rescaled {
 /// How a number in the unit of a signal changes with the unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scale {
-    /// A measured value, which changes by itself.
+    /// A measured_quantity value, which changes by itself.
     Moving,
     /// A point on the scale.
     Point,
@@ -136,8 +136,8 @@ pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit:
         if before.is_none() && after.is_none() {
             continue;
         }
-        let before = before.as_ref().and_then(|value| measured(node, &signal, object, value));
-        let after = after.as_ref().and_then(|value| measured(node, &renewed, object, value));
+        let before = before.as_ref().and_then(|value| measured_quantity(node, &signal, object, value));
+        let after = after.as_ref().and_then(|value| measured_quantity(node, &renewed, object, value));
         let stale = before.zip(after).is_some_and(|(before, after)| is_stale(before, after, scale));
         rescaled.push(Rescaled { object, name: node.name_of(object), before, after, stale });
     }
@@ -200,12 +200,12 @@ fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, Scale)> {
     let channel = signal.channel;
     let has_description = node.model.as_ref().is_some_and(|model| !model.dictionary.is_empty());
     // Without a description only the family of the process value is read.
-    let own = signal.value.0.index & 0xf000;
+    let own = signal.value_object.0.index & 0xf000;
     let families = [0x6000, 0x7000, 0x8000, 0x9000].into_iter().filter(|&family| has_description || family == own);
     let standard = IN_UNIT.into_iter().flat_map(move |(low, scale)| {
         families.clone().map(move |family| (ObjectId::new(family | low, channel), scale))
     });
-    let also = signal.also.iter().map(|&object| (object, Scale::Moving));
+    let also = signal.other_objects.iter().map(|&object| (object, Scale::Moving));
     let offset = std::iter::once((ObjectId::new(0x6127, channel), Scale::Distance));
     let described = node.model.as_ref().map_or(&[][..], |model| &model.description.objects).iter();
     let described = described.filter(|entry| entry.follows_unit == Some(channel));
@@ -224,7 +224,7 @@ fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, Scale)> {
 }
 
 /// Whether a number is unchanged although the new unit requires another number.
-fn is_stale(before: Quantity, after: Quantity, scale: Scale) -> bool {
+fn is_stale(before: ValueWithUnit, after: ValueWithUnit, scale: Scale) -> bool {
     let (Some(from), Some(to)) = (before.unit, after.unit) else { return false };
     let (was, is) = (before.number.as_f64(), after.number.as_f64());
     let Some((point, zero)) = from.convert(was, to).zip(from.convert(0.0, to)) else { return false };
@@ -247,8 +247,8 @@ mod tests {
     const PSI: Unit = Unit(0x00ab_0000);
     const BAR: Unit = Unit(0x004e_0000);
 
-    fn quantity(number: f64, unit: Unit) -> Quantity {
-        Quantity { number: Number::Real64(number), unit: Some(unit) }
+    fn quantity(number: f64, unit: Unit) -> ValueWithUnit {
+        ValueWithUnit { number: Number::Real64(number), unit: Some(unit) }
     }
 
     #[test]

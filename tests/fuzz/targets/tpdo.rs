@@ -24,10 +24,10 @@ fuzz_target!(|data: &[u8]| {
     device.signals.push(Signal {
         name: "pressure".into(),
         channel: 1,
-        value: (ObjectId::new(0x9130, 1), Some(DataType::Integer(4))),
-        also: Vec::new(),
+        value_object: (ObjectId::new(0x9130, 1), Some(DataType::Integer(4))),
+        other_objects: Vec::new(),
         status: (head & 1 != 0).then_some(ObjectId::new(0x6150, 1)),
-        marker: head & 2 != 0,
+        has_marker: head & 2 != 0,
         unit: Some(Unit(bytes.long())),
         digits: Some(bytes.byte()),
         rules: cangauge::measure::layout::Rules::default(),

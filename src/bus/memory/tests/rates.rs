@@ -1,4 +1,4 @@
-//! Bit rates: which stations receive which frames, and which errors the others see.
+//! Tests of bit rates: the frames and errors that each station receives.
 
 use super::*;
 use crate::bus::{BitRateControl, Fault, Mode};
@@ -54,7 +54,7 @@ fn bus(stations: impl IntoIterator<Item = Tuned>) -> MemoryBus {
     bus
 }
 
-/// Frames and faults up to `until`, each with its number of repetitions in a row.
+/// Frames and faults up to `until`, each with its number of consecutive repetitions.
 fn seen(bus: &mut MemoryBus, until: Mono) -> Vec<(String, u32)> {
     let mut seen: Vec<(String, u32)> = Vec::new();
     loop {
@@ -90,7 +90,7 @@ fn without_a_receiver_no_frame_is_acknowledged() {
             events[..4],
             [own("NoAcknowledge", 12), own("ErrorWarning", 1), own("NoAcknowledge", 4), own("ErrorPassive", 1)]
         );
-        // It continues, but the state does not get worse.
+        // The retries continue, but the state does not get worse.
         assert_eq!(events.len(), 5);
         assert_eq!(events[4].0, "NoAcknowledge");
         (0..QUEUE_LENGTH).for_each(|_| _ = bus.send(&frame("080#")));
@@ -119,7 +119,7 @@ fn a_device_at_a_different_bit_rate_receives_nothing_and_makes_the_program_bus_o
         ]
     );
     assert_eq!(received(&bus, 0), 0);
-    // Bus-off lasts until the interface is set up again, whichever stations are there.
+    // Bus-off lasts until the interface is set up again, whatever the other stations do.
     bus.attach(tuned(Tuning::At(BIT_RATE), &[(2_000_000, "701#00")]));
     assert_eq!(seen(&mut bus, seconds(3)), []);
     bus.stations_mut::<Tuned>().skip(1).for_each(|station| station.tuning = Tuning::Off);
@@ -137,7 +137,7 @@ fn frames_of_a_device_at_a_different_bit_rate_are_errors_for_the_others() {
     let events = seen(&mut bus, us(900_000));
     assert_eq!(events, [own("Protocol", 32)], "until the one that is alone with its rate is bus-off");
     assert_eq!(received(&bus, 1), 0);
-    // Frames of the other station do not arrive either.
+    // Frames of the other station do not arrive.
     assert_eq!(seen(&mut bus, seconds(2)), [own("Protocol", 32)]);
     // After 128 errors a station is error-passive and no longer disturbs the frames of the others.
     for round in 0..4 {
@@ -161,7 +161,7 @@ fn stations_at_one_bit_rate_communicate_and_listen_only_disturbs_none() {
     assert_eq!(received(&bus, 1), 1);
     bus.set_bit_rate(125_000, Mode::ListenOnly).expect("allowed");
     assert_eq!(seen(&mut bus, seconds(1)), [own("702#00", 1)]);
-    // A station at the wrong rate that takes part does disturb them.
+    // A station at the wrong rate that is not listen-only disturbs the frames.
     bus.set_bit_rate(500_000, Mode::Normal).expect("allowed");
     assert_eq!(seen(&mut bus, seconds(2)), [own("Protocol", 32)]);
 }
@@ -172,7 +172,7 @@ fn listen_only_receives_no_valid_frame_of_a_single_sender() {
     bus.set_bit_rate(125_000, Mode::ListenOnly).expect("allowed");
     let events = seen(&mut bus, us(100_000));
     assert!(events.iter().all(|(text, _)| text != "701#00") && events[0].0 == "Protocol", "{events:?}");
-    // It still retries; a station that acknowledges receives the frame.
+    // The sender still retries; a station that acknowledges receives the frame.
     bus.set_bit_rate(125_000, Mode::Normal).expect("allowed");
     assert_eq!(seen(&mut bus, seconds(1)), [own("701#00", 1)]);
 }
@@ -206,5 +206,5 @@ fn setting_the_bit_rate_can_be_forbidden() {
     assert!(matches!(bus.can_set_bit_rate(), Err(BusError::Permission(_))));
     assert!(matches!(bus.set_bit_rate(125_000, Mode::Normal), Err(BusError::Permission(_))));
     assert_eq!(bus.bit_rate(), Some(BIT_RATE));
-    assert_eq!(Fault::NoAcknowledge.to_string(), "no acknowledge: no other node at this bit rate");
+    assert_eq!(Fault::NoAcknowledge.to_string(), "no acknowledgement: no other node at this bit rate");
 }

@@ -33,11 +33,11 @@ pub enum State {
     ErrorWarning,
     /// An error counter has reached 128.
     ErrorPassive,
-    /// It switched itself off after too many errors.
+    /// The controller switched itself off after too many errors.
     BusOff,
-    /// It is switched off.
+    /// The controller is switched off.
     Stopped,
-    /// It sleeps.
+    /// The controller sleeps.
     Sleeping,
     /// An unknown state code.
     Unknown(u32),
@@ -99,7 +99,7 @@ impl BitTiming {
         BitTiming { bit_rate, sample_point: 0, quantum: 0, segments: [0; 4] }
     }
 
-    /// The same bit timing as a request: the kernel accepts either a bit rate or time quanta.
+    /// This bit timing as a request. The kernel accepts either a bit rate or time quanta.
     pub(in super::super) fn again(self) -> BitTiming {
         if self.quantum == 0 { BitTiming::of_rate(self.bit_rate) } else { BitTiming { bit_rate: 0, ..self } }
     }
@@ -133,7 +133,7 @@ pub struct Link {
     pub state: Option<State>,
     /// Whether the controller only listens.
     pub listen_only: Option<bool>,
-    /// Whether it supports listen-only mode, if the kernel reports that (Linux 5.17).
+    /// Whether the controller supports listen-only mode, if the kernel reports that (Linux 5.17).
     pub can_listen_only: Option<bool>,
     /// The time in milliseconds until a restart after bus-off; 0: never.
     pub restart_ms: Option<u32>,
@@ -185,12 +185,12 @@ impl Link {
         self.kind.as_deref() == Some("can")
     }
 
-    /// Switches it on or off.
+    /// A request that switches the interface on or off.
     pub(super) fn switch(&self, up: bool) -> Request {
         Request::set(self.index, u32::from(up), UP)
     }
 
-    /// Sets its bit timing and listen-only mode.
+    /// A request that sets bit timing and listen-only mode.
     pub(super) fn configure(&self, timing: BitTiming, listen_only: Option<bool>) -> Request {
         let mut request = Request::set(self.index, 0, 0);
         request.nest(LINK_INFO, |request| {

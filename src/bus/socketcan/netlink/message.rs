@@ -1,7 +1,7 @@
 //! Encodes and decodes rtnetlink messages: a header, a fixed part, attributes (linux/netlink.h, linux/rtnetlink.h), in
 //! host byte order. Decoding is total: invalid parts are skipped.
 
-/// `NLMSG_ERROR`: an acknowledge (0) or an error.
+/// `NLMSG_ERROR`: an acknowledgement (0) or an error.
 const ERROR: u16 = 2;
 /// `RTM_NEWLINK`: describes or sets an interface.
 const NEW_LINK: u16 = 16;
@@ -9,7 +9,7 @@ const NEW_LINK: u16 = 16;
 const GET_LINK: u16 = 18;
 /// `NLM_F_REQUEST`.
 const REQUEST: u16 = 1;
-/// `NLM_F_ACK`: an acknowledge is wanted.
+/// `NLM_F_ACK`: requests an acknowledgement.
 const ACK: u16 = 4;
 /// `NLM_F_CAPPED`: an error does not repeat the request beyond its header.
 const CAPPED: u16 = 0x100;
@@ -29,7 +29,7 @@ const HEADER: usize = 16;
 pub(super) struct Request(Vec<u8>);
 
 impl Request {
-    /// Asks for one interface by one of its names.
+    /// A request for one interface by one of its names.
     pub(super) fn get(name: &str) -> Request {
         let mut request = Request::new(GET_LINK, REQUEST, 0, 0, 0);
         request.attribute(NAME, &[name.as_bytes(), &[0]].concat());
@@ -46,7 +46,7 @@ impl Request {
         let mut bytes = vec![0; HEADER];
         bytes[4..6].copy_from_slice(&kind.to_ne_bytes());
         bytes[6..8].copy_from_slice(&how.to_ne_bytes());
-        // Address family and hardware type: any.
+        // Any address family and hardware type.
         bytes.extend_from_slice(&[0; 4]);
         bytes.extend_from_slice(&index.to_ne_bytes());
         bytes.extend_from_slice(&flags.to_ne_bytes());

@@ -21,7 +21,7 @@ const CAPPED: i32 = 10;
 const EXPLAINED: i32 = 11;
 /// The largest message of the kernel.
 const LARGEST: usize = 32 * 1024;
-/// The kernel answers immediately. This limit keeps a fault from blocking the program.
+/// The kernel answers immediately. With this limit, a fault cannot block the program.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// An error of the kernel.
@@ -40,12 +40,12 @@ impl From<io::Error> for Refusal {
 }
 
 impl Refusal {
-    /// The error number.
+    /// The number of the error.
     pub(super) fn code(&self) -> Option<i32> {
         self.error.raw_os_error()
     }
 
-    /// Converts it to a bus error for the operation `doing` on the interface `name`.
+    /// Converts the error to a bus error for the operation `doing` on the interface `name`.
     pub(super) fn into_error(self, doing: &str, name: &str) -> BusError {
         match self.code() {
             Some(libc::ENODEV | libc::ENXIO) => BusError::NoInterface(name.to_owned()),

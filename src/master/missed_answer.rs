@@ -11,36 +11,38 @@ use std::time::Duration;
 /// Requests without an answer are repeated for this time after a boot-up message.
 const START_TIME: Duration = Duration::from_secs(5);
 
-/// How long requests are repeated without success in all. A bus with random traffic has boot-up messages of many nodes.
-const WASTE_LIMIT: Duration = Duration::from_secs(10);
+/// The limit for the total time of repeats without an answer. Reason: random traffic may look like many boot-up
+/// messages.
+const TOTAL_REPEAT_LIMIT: Duration = Duration::from_secs(10);
 
 /// Facts about a node that did not answer a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Clue {
+pub struct MissedAnswer {
     /// The first frame that looks like an answer: with another index, or with another COB-ID.
     pub frame: Option<Frame>,
-    /// The state that its last heartbeat showed.
+    /// The state in the last heartbeat of the node.
     pub state: Option<NmtState>,
-    /// It answered an earlier request.
+    /// Whether the node answered an earlier request.
     pub has_answered: bool,
 }
 
-/// The clues of all nodes.
+/// The facts about all nodes.
 #[derive(Debug, Default)]
-pub(super) struct Clues {
+pub(super) struct MissedAnswers {
     states: BTreeMap<NodeId, NmtState>,
     answered: BTreeSet<NodeId>,
     /// When the nodes sent their boot-up messages.
     boot_times: BTreeMap<NodeId, Mono>,
-    /// How long requests were repeated after a boot-up message without success.
-    wasted: Duration,
-    /// The object of each request that waits for the first frame of its answer, and a frame that came instead.
+    /// The total time of repeats after boot-up messages that got no answer.
+    time_without_answer: Duration,
+    /// The object of each request that waits for the first frame of its answer, and another frame that was received
+    /// instead.
     open: BTreeMap<NodeId, (ObjectId, Option<Frame>)>,
     /// Nodes whose request was repeated. Their answers may have another COB-ID.
     repeated: BTreeSet<NodeId>,
 }
 
-impl Clues {
+impl MissedAnswers {
     /// A request was sent.
     pub(super) fn on_request(&mut self, node: NodeId, object: ObjectId) {
         self.open.insert(node, (object, None));
@@ -52,19 +54,19 @@ impl Clues {
     }
 
     /// Requests were repeated for this time after a boot-up message, without an answer.
-    pub(super) fn add_wasted(&mut self, time: Duration) {
-        self.wasted += time;
+    pub(super) fn add_time_without_answer(&mut self, time: Duration) {
+        self.time_without_answer += time;
     }
 
-    /// Whether a node started a short time ago: some devices do not answer for 2 to 3 s after their boot-up message.
-    /// `asked_at` is when the request was sent first: further boot-up messages do not extend its time.
+    /// Whether a node started a short time ago. Some devices do not answer for 2 to 3 s after their boot-up message.
+    /// `asked_at` is the time of the first request: further boot-up messages do not extend the time limit.
     pub(super) fn is_starting(&self, node: NodeId, asked_at: Option<Mono>, now: Mono) -> bool {
         let is_recent = |moment: Mono| now.since(moment) < START_TIME;
         let has_started = self.boot_times.get(&node).copied().is_some_and(is_recent);
-        has_started && asked_at.is_none_or(is_recent) && self.wasted < WASTE_LIMIT
+        has_started && asked_at.is_none_or(is_recent) && self.time_without_answer < TOTAL_REPEAT_LIMIT
     }
 
-    /// Whether frames with other COB-IDs than those of the nodes are wanted.
+    /// Whether frames with COB-IDs other than those of the nodes are needed.
     pub(super) fn wants_all_frames(&self) -> bool {
         !self.repeated.is_empty()
     }
@@ -76,11 +78,11 @@ impl Clues {
     }
 
     /// A transfer of a node has ended. Returns the facts that explain a missing answer.
-    pub(super) fn end(&mut self, node: NodeId) -> Clue {
+    pub(super) fn end(&mut self, node: NodeId) -> MissedAnswer {
         self.repeated.remove(&node);
         let frame = self.open.remove(&node).and_then(|(_, frame)| frame);
         let (state, has_answered) = (self.states.get(&node).copied(), self.answered.contains(&node));
-        Clue { frame, state, has_answered }
+        MissedAnswer { frame, state, has_answered }
     }
 
     /// Forgets the open requests.
@@ -88,13 +90,13 @@ impl Clues {
         (self.open, self.repeated) = (BTreeMap::new(), BTreeSet::new());
     }
 
-    /// A frame on the SDO channel of a node that does not belong to our transfer.
+    /// Handles a frame on the SDO channel of a node, if the frame is not part of our transfer.
     pub(super) fn on_channel(&mut self, node: NodeId, frame: &Frame, now: Mono) {
         if frame.id().sdo_request_node().is_some() {
             // Another master uses the channel: the frames may be its answers.
             self.open.remove(&node);
-        } else if let Some((_, odd)) = self.open.get_mut(&node) {
-            odd.get_or_insert(*frame);
+        } else if let Some((_, candidate)) = self.open.get_mut(&node) {
+            candidate.get_or_insert(*frame);
         } else if !self.answered.contains(&node) {
             self.on_other_cob_id(frame, now);
         }
@@ -116,9 +118,9 @@ impl Clues {
         }
         let [0x41..=0x43 | 0x47 | 0x4b | 0x4f | 0x60 | 0x80, a, b, c, _, _, _, _] = *frame.data() else { return };
         let object = ObjectId::from_multiplexer([a, b, c]);
-        for (asked, odd) in self.open.values_mut() {
+        for (asked, candidate) in self.open.values_mut() {
             if *asked == object {
-                odd.get_or_insert(*frame);
+                candidate.get_or_insert(*frame);
             }
         }
     }
@@ -130,30 +132,32 @@ mod tests {
 
     const OBJECT: ObjectId = ObjectId::new(0x1017, 0);
 
-    fn clue(frames: &[&str]) -> Clue {
+    fn missed(frames: &[&str]) -> MissedAnswer {
         let node = NodeId::new(5).expect("a node-ID");
-        let mut clues = Clues::default();
-        clues.on_request(node, OBJECT);
+        let mut missed_answers = MissedAnswers::default();
+        missed_answers.on_request(node, OBJECT);
         for text in frames {
             let frame: Frame = text.parse().expect("a frame");
             match frame.id().sdo_response_node().or_else(|| frame.id().sdo_request_node()) {
-                Some(other) => clues.on_channel(other, &frame, Mono::START),
-                None => clues.on_other_cob_id(&frame, Mono::START),
+                Some(other) => missed_answers.on_channel(other, &frame, Mono::START),
+                None => missed_answers.on_other_cob_id(&frame, Mono::START),
             }
         }
-        clues.end(node)
+        missed_answers.end(node)
     }
 
     #[test]
     fn frames_that_look_like_the_answer_are_kept() {
-        for odd in ["585#6000000000000000", "585#6017100100000000", "5C5#6017100000000000", "586#4B171000F4010000"] {
-            assert_eq!(clue(&[odd]).frame.map(|frame| frame.to_string()).as_deref(), Some(odd));
+        for candidate in
+            ["585#6000000000000000", "585#6017100100000000", "5C5#6017100000000000", "586#4B171000F4010000"]
+        {
+            assert_eq!(missed(&[candidate]).frame.map(|frame| frame.to_string()).as_deref(), Some(candidate));
         }
         for other in ["5C5#6018100000000000", "185#6017100000000000AA", "605#4018100100000000", "705#05"] {
-            assert_eq!(clue(&other.parse::<Frame>().map(|_| vec![other]).unwrap_or_default()).frame, None, "{other}");
+            assert_eq!(missed(&other.parse::<Frame>().map(|_| vec![other]).unwrap_or_default()).frame, None, "{other}");
         }
-        assert_eq!(clue(&["605#4018100100000000", "585#4318100147000000"]).frame, None, "another master's");
-        assert_eq!(clue(&["705#04"]).state, Some(NmtState::Stopped));
-        assert_eq!(clue(&["705#04", "705#00"]).state, None);
+        assert_eq!(missed(&["605#4018100100000000", "585#4318100147000000"]).frame, None, "another master's");
+        assert_eq!(missed(&["705#04"]).state, Some(NmtState::Stopped));
+        assert_eq!(missed(&["705#04", "705#00"]).state, None);
     }
 }
