@@ -1,12 +1,12 @@
 //! Abort codes that the simulated SDO server sends (CiA 301, 7.2.4.3.17).
 
-/// The reason for a refusal: the code in bytes 4 to 7 of the frame.
+/// The reason for a rejection: the code in bytes 4 to 7 of the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Abort(pub u32);
 
 impl Abort {
-    /// The code that a device sends if its manual lists only `listed`: this one if it is listed, else the nearest
-    /// listed one. If nothing is listed or no code is near, this one.
+    /// The code that a device sends if its manual lists only
+    /// `listed`: the nearest listed code. If no listed code is near, `self`.
     pub(super) fn of_list(self, listed: &[u32]) -> Abort {
         let kin: &[Abort] = match self {
             Abort::VALUE | Abort::TOO_HIGH | Abort::TOO_LOW => &[Abort::VALUE, Abort::TOO_HIGH],
@@ -52,7 +52,7 @@ impl Abort {
     pub const LENGTH: Abort = Abort(0x0607_0010);
     /// No such sub-index.
     pub const NO_SUB_INDEX: Abort = Abort(0x0609_0011);
-    /// The value is not one of those allowed.
+    /// The value is not allowed.
     pub const VALUE: Abort = Abort(0x0609_0030);
     /// Above the highest value.
     pub const TOO_HIGH: Abort = Abort(0x0609_0031);

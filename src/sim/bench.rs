@@ -24,7 +24,7 @@
 //! [device.lss]               # keys are services, by the command specifier of the request
 //! lose = [0x17]              # the next answer is lost, once per entry
 //! late = { "0x11" = "2s" }   # the next answer is late
-//! refuse = { "0x17" = 1 }    # always refused, with this error code: 11h, 13h, 17h
+//! refuse = { "0x17" = 1 }    # always rejected, with this error code: 11h, 13h, 17h
 //! endless_fastscan = true    # answers every fastscan frame in configuration state
 //!
 //! [[device.channel]]         # a measured quantity; missing keys keep their defaults
@@ -52,10 +52,10 @@ use file::{BenchFile, DeviceEntry};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// The word in place of a node-ID for an unconfigured device.
+/// The word instead of a node-ID for an unconfigured device.
 const UNCONFIGURED: &str = "unconfigured";
 
-/// The bench of plain `sim`.
+/// The bench of `sim` without arguments.
 const DEFAULT: &str = "mh4@1,d20@2,mc1609@3,dps@127";
 
 /// Devices that can be attached to a bus.
@@ -84,10 +84,10 @@ pub enum BenchError {
 }
 
 impl Bench {
-    /// Reads the text after `sim:`; empty text is the bench of plain `sim`.
+    /// Reads the text after `sim:`; empty text means the default bench.
     ///
     /// # Errors
-    /// Any mistake in it, before a file is opened for writing.
+    /// Any mistake in the text, before a file is opened for writing.
     pub fn parse(spec: &str) -> Result<Bench, BenchError> {
         if spec.is_empty() {
             Bench::from_list(DEFAULT)
@@ -122,7 +122,7 @@ impl Bench {
         Bench::build(file, Path::new(""))
     }
 
-    /// Reads a bench file; `beside` is the folder of the files that it names.
+    /// Reads a bench file; `beside` is the folder of the files named in it.
     ///
     /// # Errors
     /// TOML errors with their place, unknown keys, devices and objects that do not exist.
@@ -158,7 +158,7 @@ impl Bench {
         self.clock
     }
 
-    /// The devices, with a recorder if the bench asks for one.
+    /// The devices, with a recorder if the bench contains `record`.
     ///
     /// # Errors
     /// The record cannot be written.

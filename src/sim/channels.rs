@@ -29,7 +29,7 @@ enum Shows {
     Highest,
 }
 
-/// How a number in the unit of its channel is converted if the unit changes.
+/// The kind of conversion of a number if the unit of its channel changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// A point on the scale: limits, start and end of the range.
@@ -64,13 +64,13 @@ struct Channel {
     signal: SignalEntry,
     quantity: Quantity,
     filter: Filter,
-    /// The lowest and highest value that was read.
+    /// The lowest and highest value so far.
     seen: Option<(f64, f64)>,
     /// Other objects in the unit of the channel.
     follows: Vec<(ObjectId, Kind)>,
 }
 
-/// One measured value as it was sent.
+/// One measured value as sent.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Reading {
     pub(super) signal: String,
@@ -134,8 +134,8 @@ impl Channels {
         self.shown.get(&object).is_some_and(|(_, shows)| *shows == Shows::Status)
     }
 
-    /// The measured value at `time` as the number in the object: an integer is multiplied by its power of ten. Without
-    /// marker and rounding.
+    /// The measured value at `time` as the number in the object: an integer is multiplied by its power of ten. The
+    /// number is without marker and rounding.
     pub(super) fn number(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<f64> {
         let (index, Shows::Value) = *self.shown.get(&object)? else { return None };
         let channel = self.list.get_mut(index)?;
@@ -183,7 +183,7 @@ impl Channels {
         true
     }
 
-    /// Makes the present value the tare zero (x138h).
+    /// Sets the tare zero (x138h) to the present value.
     pub(super) fn tare(&mut self, objects: &mut Objects, number: u8, time: Duration) -> Result<(), Abort> {
         let channel = self.list.iter_mut().find(|channel| channel.signal.channel == number).ok_or(Abort::NOT_STORED)?;
         let object = channel.tare_object(objects).ok_or(Abort::NOT_STORED)?;
@@ -202,7 +202,7 @@ impl Channels {
         self.list.iter().any(|channel| channel.signal.unit == Some(object))
     }
 
-    /// Changes the unit of a channel and converts every object in it. `false` if the value cannot be converted.
+    /// Changes the unit of a channel and converts every object in this unit. `false` if the value cannot be converted.
     pub(super) fn change_unit(&self, objects: &mut Objects, object: ObjectId, to: Unit) -> bool {
         let Some(channel) = self.list.iter().find(|channel| channel.signal.unit == Some(object)) else { return false };
         let from = channel.unit(objects);
@@ -219,8 +219,8 @@ impl Channels {
         true
     }
 
-    /// A limit that exists in several types is one quantity: after a write, the others follow. So do the integers
-    /// after a change of their decimal digits.
+    /// A limit that exists in several types is one quantity: a write changes it in all types. A change of the decimal
+    /// digits also changes its integers.
     pub(super) fn share(&self, objects: &mut Objects, written: ObjectId) {
         for channel in &self.list {
             let is_kept = channel.follows.iter().any(|(object, _)| *object == written);
@@ -239,7 +239,7 @@ impl Channels {
         self.list.iter_mut().for_each(|channel| channel.filter.begin(objects, &channel.quantity, time));
     }
 
-    /// Restarts a filter if the object written belongs to it.
+    /// Restarts a filter if the written object belongs to it.
     pub(super) fn refilter(&mut self, objects: &mut Objects, written: ObjectId, time: Duration) {
         let constant = self.damp(objects, written);
         let sets = |channel: &&mut Channel| channel.filter.is_set_by(constant.unwrap_or(written));
@@ -248,7 +248,7 @@ impl Channels {
         }
     }
 
-    /// Notes that a PDO with these objects was sent.
+    /// Records that a PDO with these objects was sent.
     pub(super) fn sent(&mut self, mapped: &[ObjectId]) {
         for (index, _) in mapped.iter().filter_map(|object| self.shown.get(object)) {
             if let Some(channel) = self.list.get_mut(*index) {
@@ -257,8 +257,7 @@ impl Channels {
         }
     }
 
-    /// Derives the constant of the moving average from a damping that was written (MH-4, 4.3.7). Returns the object
-    /// changed.
+    /// Computes the constant of the moving average from a written damping (MH-4, 4.3.7). Returns the changed object.
     fn damp(&self, objects: &mut Objects, object: ObjectId) -> Option<ObjectId> {
         objects.spec(object).filter(|spec| spec.name == "damping")?;
         let [kind, constant] = [0x61a0, 0x61a1].map(|index| ObjectId::new(index, object.sub));
@@ -304,8 +303,8 @@ impl Channel {
         shown.push((self.signal.value, Shows::Value));
         shown.extend(self.signal.also.iter().map(|object| (*object, Shows::Value)));
         shown.extend(self.signal.status.map(|object| (object, Shows::Status)));
-        // These two are manufacturer-specific: they have fixed names, not fixed indices. A device with one channel may
-        // have them without sub-indices.
+        // These two objects are manufacturer-specific: they have fixed names, but no fixed indices. A device with one
+        // channel may have them without sub-indices.
         let mine = |object: &ObjectId| object.sub == sub || (object.sub == 0 && alone);
         shown.extend(objects.specs().filter(|(object, _)| mine(object)).filter_map(|(object, spec)| {
             match spec.name.as_str() {
@@ -348,7 +347,7 @@ impl Channel {
         self.filter.value(&self.quantity, time)
     }
 
-    /// Converts a measured quantity into the present unit, with factor and offset.
+    /// Converts a measured quantity to the present unit, with factor and offset.
     fn value(&self, objects: &Objects, raw: f64) -> f64 {
         let converted = Unit(self.quantity.channel().unit).convert(raw, self.unit(objects)).unwrap_or(raw);
         let factor = objects.real(ObjectId::new(0x6126, self.signal.channel)).unwrap_or(1.0);
@@ -415,7 +414,7 @@ impl Channel {
         })
     }
 
-    /// Derives the integer forms of every limit from the REAL32 form, except that of `exact`.
+    /// Computes the integer forms of every limit from the REAL32 form, except that of `exact`.
     fn align(&self, objects: &mut Objects, exact: Option<ObjectId>) {
         for (object, _) in self.follows.iter().filter(|(object, _)| Some(*object) != exact) {
             let Some((own, real)) = self.pv(objects, *object).zip(self.pv(objects, real_form(*object))) else {

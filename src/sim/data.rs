@@ -1,7 +1,7 @@
-//! Data that only the simulator needs: the measured quantities of a device and facts that no manual prints.
+//! Data that only the simulator needs: the measured quantities of a device and facts that no manual contains.
 //!
-//! One file in `models/` per device that needs one. A device without a file gets moving quantities that follow from
-//! its description, so that a new device is one description.
+//! Some devices have a file in `models/`. For a device without a file, moving quantities are derived from its
+//! description, so a new device needs only a description.
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -26,7 +26,7 @@ pub struct SimData {
     /// Whether a new node-ID resets the COB-IDs of EMCY and TPDOs to the predefined connection set.
     #[serde(default)]
     pub cob_ids_follow_node_id: bool,
-    /// How far outside of the measuring range an overload begins, in percent of the range.
+    /// The distance from the measuring range at which an overload begins, in percent of the range.
     #[serde(default)]
     pub overload_percent: f64,
     /// The emergency code of an overload, if the device sends one.
@@ -46,7 +46,7 @@ pub struct SimLss {
     /// The services, by the command specifier of the request; an empty list means all of CiA 305.
     #[serde(default)]
     pub services: Vec<u8>,
-    /// The NMT states in which it answers LSS; an empty list means all.
+    /// The NMT states in which the device answers LSS; an empty list means all.
     #[serde(default)]
     pub states: Vec<SimState>,
     /// Whether the answer to the selective switch contains the mode (44h 01h).
@@ -101,9 +101,9 @@ impl SimData {
         }
     }
 
-    /// Quantities in the middle of the ranges that the description gives, else between 0 and 100.
+    /// Quantities in the middle of the measuring ranges in the description, else between 0 and 100.
     fn generic(model: &Model) -> SimData {
-        // A value with a default does not move: the simulator returns the default.
+        // A value with a default is constant: the simulator returns the default.
         let moves =
             |signal: &&SignalEntry| model.dictionary.get(signal.value).is_some_and(|entry| entry.default.is_none());
         let channels = model.description.signals.iter().filter(moves).map(|signal| {

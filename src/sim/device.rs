@@ -1,4 +1,4 @@
-//! A simulated device: NMT, heartbeat, guarding, and the events that make it send frames.
+//! A simulated device: NMT, heartbeat, guarding, and the events that cause frames.
 
 mod assign;
 mod station;
@@ -48,7 +48,7 @@ enum Phase {
     /// The device has no node-ID and answers LSS only.
     Unconfigured,
     Running(State),
-    /// It changes its bit rate at `switch`, is silent until `until`, and then has the state `after`.
+    /// The device changes its bit rate at `switch`, is silent until `until`, and then has the state `after`.
     Retiming {
         after: Option<State>,
         switch: Option<Mono>,
@@ -67,7 +67,7 @@ pub struct Device {
     heartbeat: Option<Mono>,
     /// Toggle bit of the next guarding answer.
     toggle: bool,
-    /// The last guarding request: the first one arms life guarding.
+    /// The last guarding request. The first one starts life guarding.
     guarded: Option<Mono>,
     /// The next time at which an overload may begin or end.
     next_overload_change: Option<Mono>,
@@ -127,7 +127,7 @@ impl Device {
         })
     }
 
-    /// The same device with a recorder for the values it sends.
+    /// The same device with a recorder for the sent values.
     pub fn recording(mut self, recorder: Recorder) -> Device {
         self.recorder = Some(recorder);
         self
@@ -285,7 +285,7 @@ impl Device {
         self.send_emergencies(now, out);
     }
 
-    /// When life guarding fails: no request for the guard time multiplied by the life time factor.
+    /// When life guarding fails: after guard time × life time factor without a request.
     fn life_end(&self) -> Option<Mono> {
         let guarded = self.guarded.filter(|_| self.heartbeat.is_none())?;
         let objects = &self.memory.objects;
@@ -293,7 +293,7 @@ impl Device {
         (life_time > 0).then(|| guarded + Duration::from_millis(life_time.into()))
     }
 
-    /// A device that is not guarded any more leaves OPERATIONAL (CiA 301, 1029h); the next request arms it again.
+    /// If guarding stops, the device leaves OPERATIONAL (CiA 301, 1029h). The next request starts life guarding again.
     fn end_guarding(&mut self, now: Mono) {
         self.guarded = None;
         if self.memory.emergencies.knows(GUARDING_FAILED) {
@@ -399,7 +399,7 @@ impl Device {
         }
     }
 
-    /// The record's lines for a TPDO.
+    /// The lines of the record for a TPDO.
     fn lines(&self, values: &[(ObjectId, Vec<u8>)], time: Duration) -> Vec<Line> {
         let Memory { objects, channels, node, .. } = &self.memory;
         let mapped: Vec<ObjectId> = values.iter().map(|(object, _)| *object).collect();
@@ -447,7 +447,7 @@ impl Device {
     }
 }
 
-/// The next due time, one period after `due`, so that it does not drift. If that time has passed, one period after `now`.
+/// The next due time: one period after `due`, to avoid drift. If that time has passed, one period after `now`.
 pub(super) fn next_due(due: Mono, period: Duration, now: Mono) -> Mono {
     let next = due + period;
     if next > now { next } else { now + period }

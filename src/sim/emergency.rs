@@ -24,12 +24,12 @@ pub(super) struct Emergencies {
     /// Pending codes with their channels; channel 0 is the device itself.
     pending: BTreeMap<u16, BTreeSet<u8>>,
     history: VecDeque<u32>,
-    /// The number of errors in 1003h:0, for a device whose 1003h has no other entry.
+    /// The number of errors in 1003h:0, for a device without further entries of 1003h.
     count: u8,
     waiting: VecDeque<[u8; 8]>,
     /// End of the inhibit time.
     free: Mono,
-    /// [`Quirk::EmergencyRepeats`].
+    /// Whether the device has [`Quirk::EmergencyRepeats`].
     repeats: bool,
     /// The message that is repeated while an error is pending, and its next time.
     again: Option<([u8; 8], Mono)>,
@@ -47,7 +47,7 @@ impl Emergencies {
         self.described.iter().any(|entry| entry.code == code)
     }
 
-    /// Notes an error of a channel. A code that is already pending is not sent again.
+    /// Records an error of a channel. A code that is already pending is not sent again.
     pub(super) fn raise(&mut self, objects: &mut Objects, code: u16, channel: u8, status: u8) {
         let known = self.pending.contains_key(&code);
         self.pending.entry(code).or_default().insert(channel);
@@ -74,7 +74,7 @@ impl Emergencies {
         self.queue(objects, code, extra);
     }
 
-    /// Notes the end of an error.
+    /// Records the end of an error.
     pub(super) fn clear(&mut self, objects: &mut Objects, code: u16, channel: u8) {
         let Some(channels) = self.pending.get_mut(&code) else { return };
         channels.remove(&channel);
@@ -92,7 +92,7 @@ impl Emergencies {
         self.publish(objects);
     }
 
-    /// Forgets everything, as at power-on.
+    /// Resets everything, as at power-on.
     pub(super) fn forget(&mut self) {
         self.pending.clear();
         self.again = None;
@@ -101,12 +101,12 @@ impl Emergencies {
         self.waiting.clear();
     }
 
-    /// Drops the messages that wait, as in STOPPED.
+    /// Drops the waiting messages, as in STOPPED.
     pub(super) fn drop_waiting(&mut self) {
         self.waiting.clear();
     }
 
-    /// Writes register and history into their objects.
+    /// Writes register and history to their objects.
     pub(super) fn publish(&self, objects: &mut Objects) {
         objects.put(ERROR_REGISTER, vec![self.register()]);
         let capacity = u8::try_from(self.capacity(objects)).unwrap_or(u8::MAX);
@@ -153,7 +153,7 @@ impl Emergencies {
         }
     }
 
-    /// The next message, if there is one and the inhibit time is over.
+    /// The next message, if there is one and the inhibit time has passed.
     pub(super) fn next_frame(&mut self, objects: &Objects, node: NodeId, now: Mono) -> Option<Frame> {
         if now < self.free {
             return None;
@@ -190,7 +190,7 @@ fn cob_id(objects: &Objects, node: NodeId) -> Option<CanId> {
     if cob_id & 0x8000_0000 == 0 { CanId::standard(id) } else { None }
 }
 
-/// The number in a byte of the message: "1 (channel)", "AI status 6150h", "0".
+/// The number in a byte of the message, from its meaning: "1 (channel)", "AI status 6150h", "0".
 fn meaning_of(meaning: &str, channel: u8, status: u8) -> u8 {
     let meaning = meaning.to_ascii_lowercase();
     if meaning.contains("channel") {

@@ -1,4 +1,4 @@
-//! The filter of a simulated channel (CiA 404: 61A0h, 61A1h), between the sensor's samples and the process value.
+//! The filter of a simulated channel (CiA 404: 61A0h, 61A1h), between the samples of the sensor and the process value.
 
 use super::model::Quantity;
 use super::objects::Objects;
@@ -9,9 +9,9 @@ use std::time::Duration;
 
 const TYPE: u16 = 0x61a0;
 const CONSTANT: u16 = 0x61a1;
-/// The longest mean that ends with a PDO; above it, the filter is a moving average (MC1609, 2.2, Filter).
+/// The longest mean that ends with a PDO. After this time, the filter is a moving average (MC1609, 2.2, Filter).
 const MAX_LENGTH: Duration = Duration::from_millis(1000);
-/// After this many times its constant, a moving average no longer depends on earlier samples.
+/// A moving average no longer depends on samples older than this multiple of its constant.
 const FORGOTTEN: u64 = 40;
 
 /// How samples are combined into one value.
@@ -19,7 +19,7 @@ const FORGOTTEN: u64 = 40;
 enum Kind {
     /// Each sample is a value.
     None,
-    /// A part of the difference is added: `v += (in - v) / N`.
+    /// A part of the difference is added to the value: `v += (in - v) / N`.
     Moving,
     /// The mean of N samples, renewed every N samples.
     Repeating,
@@ -44,7 +44,7 @@ pub(super) struct Filter {
     sum: f64,
     /// The number of samples in the sum.
     count: u64,
-    /// Whether there was a complete mean.
+    /// Whether a mean is complete.
     is_full: bool,
 }
 
@@ -84,7 +84,7 @@ impl Filter {
     pub(super) fn begin(&mut self, objects: &Objects, quantity: &Quantity, time: Duration) {
         let [kind, constant] = [TYPE, CONSTANT].map(|index| objects.number(ObjectId::new(index, self.channel)));
         self.kind = self.kinds.get(&kind).copied().unwrap_or(Kind::None);
-        // The manual does not print the effect of constant 0; here it acts as 1.
+        // The manual does not contain the effect of constant 0. It is treated as 1.
         self.constant = u64::from(constant).max(1);
         self.next = quantity.index(time);
         self.is_new = true;
@@ -122,10 +122,10 @@ impl Filter {
             }
             Kind::SincePdo if missing > window.saturating_add(longest) => {
                 self.next = present - window;
-                // The mean has reached its longest.
+                // The mean has its greatest length.
                 (self.is_new, self.count) = (false, longest);
             }
-            // Skip complete means, so that the next ones end at the same samples.
+            // Skips whole means, so that later means still end at the same samples.
             Kind::Repeating => self.next += (missing / self.constant).saturating_sub(2) * self.constant,
             _ => {}
         }
@@ -156,7 +156,7 @@ impl Filter {
         }
     }
 
-    /// Notes that a PDO with the value was sent.
+    /// Records that a PDO with the value was sent.
     pub(super) fn sent(&mut self) {
         if self.kind == Kind::SincePdo {
             (self.sum, self.count) = (0.0, 0);
@@ -164,8 +164,8 @@ impl Filter {
     }
 }
 
-/// The constant with which a moving average is within 1 % of a step's end after `damping`. MH-4, 4.3.7 gives this
-/// meaning of 2023h, but not its formula.
+/// The constant of a moving average that is within 1 % of the final value of a step after `damping`. MH-4, 4.3.7 gives
+/// this meaning of 2023h, but not its formula.
 pub(super) fn constant_for(damping: Duration, sample_us: u128) -> u16 {
     let steps = damping.as_micros() as f64 / sample_us as f64;
     // (1 - 1/N)^steps = 0.01
@@ -265,7 +265,7 @@ mod tests {
         mean.sent();
         assert_eq!(mean.value, 4.0, "until the next sample");
         assert_eq!(shown(&mut mean, &[10.0, 20.0, 30.0, 40.0, 50.0], 5), [10.0, 15.0, 20.0, 25.0, 30.0]);
-        // From then on the moving average, by its constant.
+        // From here on, the filter is the moving average with this constant.
         assert_eq!(shown(&mut mean, &[70.0, 0.0], 5), [40.0, 30.0]);
         mean.sent();
         assert_eq!(shown(&mut mean, &[2.0, 4.0], 5), [2.0, 3.0]);

@@ -7,19 +7,19 @@ use crate::canopen::frame::Frame;
 use crate::canopen::wire_length::priority;
 use std::time::Duration;
 
-/// Wait time if the bus accepts no more frames.
+/// The wait if the bus accepts no more frames.
 const FULL: Duration = Duration::from_millis(1);
 
-/// The longest single wait; any finite number serves.
+/// The longest single wait. The value is not critical.
 const IDLE: Duration = Duration::from_secs(3600);
 
 /// Runs stations on `bus` until the user asks to stop, or until `until`.
 ///
-/// The stations receive each other's frames, as on a bus_bit_rate: a bus does not return the frames sent on it. A station at a
-/// different bit rate than the bus, if that is known, neither receives nor sends. It cannot cause bus errors.
+/// A bus does not return frames to their sender, so frames are passed to the other stations here. A station at a
+/// different bit rate than the bus neither receives nor sends; it cannot cause bus errors.
 ///
 /// # Errors
-/// The bus failed. A full transmit queue is no error: the frame waits.
+/// The bus failed. A full transmit queue is not an error: the frame waits.
 pub fn run(
     bus: &mut dyn Bus,
     stations: Vec<Box<dyn Station>>,
@@ -69,7 +69,7 @@ impl Host {
         }
     }
 
-    /// Notes that the interface is up again, perhaps at another bit rate.
+    /// Records that the interface is up again, perhaps at another bit rate.
     fn retime(&mut self, bit_rate: Option<u32>) {
         if bit_rate != self.bit_rate {
             self.bit_rate = bit_rate;
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn device_at_another_bit_rate_neither_receives_nor_sends() {
-        // LSS switches to 125 kbit/s. A request at 250 kbit/s follows, and the time of a heartbeat.
+        // LSS switches to 125 kbit/s. Then follow a request at 250 kbit/s and the time of a heartbeat.
         let configure = ["7E5#0401000000000000", "7E5#1300040000000000", "7E5#1500000000000000"];
         let mut plan = vec![(1, "605#2B17100064000000")];
         plan.extend(configure.iter().zip([10, 20, 30]).map(|(frame, at)| (at, *frame)));

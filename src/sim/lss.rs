@@ -1,4 +1,4 @@
-//! The LSS slave of a simulated device, written from the tables of CiA 305 and not with the master's code.
+//! The LSS slave of a simulated device, written from the tables of CiA 305, without the code of the master.
 
 use super::settings::Settings;
 use crate::canopen::id::NodeId;
@@ -16,16 +16,16 @@ const PARTS: u8 = 4;
 #[derive(Clone, Debug)]
 pub(super) struct Slave {
     supported: SimLss,
-    /// Services that are refused, with their error codes.
+    /// Services that are rejected, with their error codes.
     refuses: BTreeMap<u8, u8>,
     /// Whether every fastscan frame is answered in configuration state, as CANopenNode does.
     endless_fastscan: bool,
     is_configuring: bool,
-    /// How many parts of a selective address have matched so far.
+    /// The number of matching parts of a selective address so far.
     selected: u8,
-    /// How many parts of an identification have matched so far.
+    /// The number of matching parts of an identification so far.
     identified: u8,
-    /// The part of the identity that fastscan asks for next.
+    /// The next part of the identity in a fastscan.
     scanned: u8,
 }
 
@@ -41,9 +41,9 @@ pub(super) struct Reply {
 pub(super) enum Then {
     #[default]
     Nothing,
-    /// It was unconfigured and now has a node-ID.
+    /// The device was unconfigured and now has a node-ID.
     Boot,
-    /// It is silent for this time, changes its bit rate, and is silent for the same time again.
+    /// The device is silent for this time, changes its bit rate, and is silent for this time again.
     Activate(Duration),
 }
 
@@ -112,7 +112,7 @@ impl Slave {
         }
     }
 
-    /// Switch state global.
+    /// The service "switch state global".
     fn switch(&mut self, mode: u8, settings: &mut Settings) -> Reply {
         match mode {
             0 if self.is_configuring => {
@@ -127,7 +127,7 @@ impl Slave {
         Reply::default()
     }
 
-    /// Switch state selective: vendor-ID, product code, revision number and serial number must all match.
+    /// The service "switch state selective": vendor-ID, product code, revision number and serial number must all match.
     fn select(&mut self, part: u8, so_far: u8, number: u32, identity: Identity) -> Reply {
         if part != 0 && part != so_far || identity[usize::from(part)] != number {
             return Reply::default();
@@ -141,8 +141,8 @@ impl Slave {
         Reply::with(&[0x44, u8::from(self.supported.reports_mode)])
     }
 
-    /// Identify remote slaves: vendor-ID and product code must match; revision number and serial number must be in a
-    /// range, whose lower end comes first.
+    /// The service "identify remote slaves": vendor-ID and product code must match. Revision number and serial number
+    /// must be in a range; the lower end is sent first.
     fn identify(&mut self, step: u8, so_far: u8, number: u32, identity: Identity) -> Reply {
         let [vendor, product, revision, serial] = identity;
         let fits = match step {
@@ -174,7 +174,7 @@ impl Slave {
             return Reply::default();
         }
         if check == 0 {
-            // After the last part the slave is found, and the order restarts.
+            // After the last part the slave is found, and the scan restarts.
             self.is_configuring = next < part;
         }
         self.scanned = next;

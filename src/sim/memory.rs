@@ -1,5 +1,5 @@
-//! The objects as the SDO server sees them: objects with a value, objects with a measurement, and objects that act when
-//! they are written.
+//! The objects of the SDO server: objects with a value, objects with a measurement, and objects whose write starts an
+//! action.
 
 use super::abort::Abort;
 use super::channels::Channels;
@@ -40,7 +40,7 @@ impl Memory {
         self.remap == Remap::CountOnly
     }
 
-    /// The memory during one request.
+    /// The memory for one request.
     pub(super) fn at(&mut self, time: Duration, pre_operational: bool) -> Access<'_> {
         Access { memory: self, time, pre_operational, written: None }
     }

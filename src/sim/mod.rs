@@ -1,9 +1,9 @@
 //! Simulated devices, built from the device descriptions: object dictionary, SDO server, NMT, heartbeat, TPDOs,
 //! emergencies, LSS and moving quantities.
 //!
-//! Written from CiA 301, CiA 404 and the manuals, not with the client's encoders: two halves with the same mistake
-//! agree with each other. No code here depends on a device's name: the descriptions and the files in `models/` contain
-//! the differences.
+//! Written from CiA 301, CiA 404 and the manuals, without the encoders of the client: a shared mistake would stay
+//! hidden. No code depends on the name of a device: the descriptions and the files in `models/` contain the
+//! differences.
 //!
 //! A device is a [`Station`](crate::bus::memory::Station) on a [`MemoryBus`](crate::bus::memory::MemoryBus) or, through
 //! [`host`], on a real bus.

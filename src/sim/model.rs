@@ -6,20 +6,20 @@ use std::time::Duration;
 /// The side of the measuring range on which the quantity is outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Above its end.
+    /// Above the end of the range.
     High,
-    /// Below its start.
+    /// Below the start of the range.
     Low,
 }
 
-/// A period in which the quantity is outside of its range.
+/// A period in which the quantity is outside of the measuring range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overload {
-    /// Its start, in the bus's time.
+    /// The start of the period, in the time of the bus.
     pub from: Duration,
-    /// Its end.
+    /// The end of the period.
     pub until: Duration,
-    /// The side of the range.
+    /// The side of the measuring range.
     pub direction: Direction,
 }
 
@@ -28,14 +28,14 @@ pub struct Overload {
 pub(super) struct Quantity {
     channel: SimChannel,
     sample: Duration,
-    /// How far outside of the range an overload begins, in the unit of the channel.
+    /// The distance from the measuring range at which an overload begins, in the unit of the channel.
     margin: f64,
     overloads: Vec<Overload>,
     key: u64,
 }
 
 impl Quantity {
-    /// `seed` is the bench's; `serial` makes the noise of equal devices different.
+    /// `seed` is that of the bench. `serial` makes the noise of equal devices different.
     pub(super) fn new(
         channel: SimChannel,
         sample: Duration,
@@ -82,7 +82,7 @@ impl Quantity {
     pub(super) fn sample(&self, index: u64) -> f64 {
         let sampled = self.sample_time(index);
         let channel = &self.channel;
-        // Outside of the limit even with noise.
+        // The value is outside of the limit even with noise.
         let far = self.margin + 0.05 * (channel.end - channel.start);
         match self.scripted(sampled) {
             Some(Direction::High) => channel.end + far,
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(quiet.at(Duration::ZERO), 5.0);
         assert!((quiet.at(ms(1000)) - 7.0).abs() < 0.01, "{}", quiet.at(ms(1000)));
         assert!((quiet.at(ms(3000)) - 3.0).abs() < 0.01);
-        // A new value every 640 us and none in between.
+        // The value changes only every 640 us.
         assert_eq!(quiet.at(Duration::from_micros(640)), quiet.at(Duration::from_micros(1279)));
         assert_ne!(quiet.at(Duration::from_micros(640)), quiet.at(Duration::from_micros(1280)));
         assert_eq!(quiet.next_sample(Duration::from_micros(640)), Duration::from_micros(1280));

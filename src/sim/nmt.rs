@@ -1,4 +1,4 @@
-//! The NMT slave of a simulated device, written from the tables of CiA 301 and not with the master's code.
+//! The NMT slave of a simulated device, written from the tables of CiA 301, without the code of the master.
 
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};

@@ -2,8 +2,7 @@
 
 use crate::canopen::value::DataType;
 
-/// `value` rounded to the nearest integer of the type (half away from zero); the nearest end of the range if it does
-/// not fit. NaN gives 0.
+/// Rounds to the nearest integer of the type (half away from zero), limited to the range of the type. NaN gives 0.
 pub(super) fn to_integer(value: f64, data_type: DataType) -> i64 {
     let (low, high) = match data_type {
         DataType::Integer(width) => {

@@ -12,7 +12,7 @@ use crate::device::scalar::{NumberRange, Scalar};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The facts about one entry that the server needs.
+/// The facts about one entry for the server.
 #[derive(Clone, Debug)]
 pub(super) struct Spec {
     pub(super) name: String,
@@ -28,7 +28,7 @@ pub(super) struct Spec {
     group: Option<Group>,
 }
 
-/// Whether these bytes are the signature. With "set", byte 0 is the value.
+/// Whether these bytes are the signature. For "set", byte 0 is the value.
 fn is_signed(signature: Signature, bytes: &[u8]) -> bool {
     let word: &[u8] = match signature {
         Signature::Save => b"save",
@@ -62,7 +62,7 @@ impl Group {
         })
     }
 
-    /// Whether a command for `self` reaches an entry of group `entry`.
+    /// Whether a command for `self` includes an entry of group `entry`.
     fn reaches(self, entry: Group) -> bool {
         self == Group::All || self == entry
     }
@@ -97,11 +97,11 @@ impl Area {
 #[derive(Clone, Debug)]
 pub(super) struct Objects {
     specs: Arc<BTreeMap<ObjectId, Spec>>,
-    /// Whether the description has `stored` marks. Without marks, every writable object is stored, by area.
+    /// Whether the description contains `stored` keys. Without them, every writable object is stored, by area.
     marked: bool,
-    /// [`Quirk::SaveAllResetsCobIds`].
+    /// Whether the device has [`Quirk::SaveAllResetsCobIds`].
     resets_cob_ids: bool,
-    /// [`Quirk::CobIdZeroIsDefault`].
+    /// Whether the device has [`Quirk::CobIdZeroIsDefault`].
     zero_is_default: bool,
     values: BTreeMap<ObjectId, Vec<u8>>,
     saved: BTreeMap<ObjectId, Vec<u8>>,
@@ -253,8 +253,8 @@ impl Objects {
         }
     }
 
-    /// Stores the working values of a group. Factory defaults are not stored, so that defaults with the node-ID follow
-    /// it.
+    /// Stores the working values of a group. Factory defaults are not stored, so that defaults with the node-ID still
+    /// depend on it.
     pub(super) fn save(&mut self, group: Group, node: NodeId) {
         let specs = Arc::clone(&self.specs);
         for (object, spec) in specs.iter() {
@@ -318,7 +318,7 @@ impl Spec {
         }
     }
 
-    /// An object of an EDS. The words for storing and restoring are those of CiA 301.
+    /// An object of an EDS. The signatures for storing and restoring are those of CiA 301.
     fn plain(entry: &Entry) -> Spec {
         let limit = |scalar: &Option<Scalar>| scalar.as_ref().and_then(Scalar::as_f64);
         let signature = match (entry.object.index, entry.object.sub) {

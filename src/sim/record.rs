@@ -1,6 +1,5 @@
-//! The simulator's own record of the values it sent: one line for each measured value in each TPDO, with the time at
-//! which the frame was complete. It formats its text without the program's output code, so that a test can compare
-//! both.
+//! The record of the values that the simulator sent: one line for each measured value in each TPDO. The time is the end
+//! of the frame. The text is formatted without the output code of the program, so that a test can compare both.
 
 use super::channels::Reading;
 use super::model::Direction;
@@ -67,7 +66,7 @@ pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], has_status: bo
     let status = match (reading.overload, has_status, reading.marker) {
         (Some(Direction::High), true, _) => "overload-high",
         (Some(Direction::Low), true, _) => "overload-low",
-        // The marker alone does not show the direction.
+        // A marker without a status does not show the direction.
         (Some(_), false, true) => "invalid",
         (None, true, _) | (None, false, true) => "ok",
         (_, false, false) => "",
@@ -83,7 +82,7 @@ pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], has_status: bo
     Line(format!("{node},{},{value},{unit},{status},{}", reading.signal, raw(bytes)))
 }
 
-/// The line of a mapped object that is no process value (a field value), under its address.
+/// The line of a mapped object that is not a process value (a field value), with its address.
 pub(super) fn plain(node: NodeId, object: ObjectId, data_type: DataType, bytes: &[u8]) -> Line {
     let value = match data_type {
         DataType::Real32 | DataType::Real64 => real(bytes),
@@ -121,7 +120,7 @@ fn decimal(number: i128, digits: u32) -> String {
     text
 }
 
-/// A REAL32 as the shortest text that reads back to the same number.
+/// A REAL32 as the shortest text that parses to the same number.
 fn real(bytes: &[u8]) -> String {
     let Ok(bytes) = bytes.try_into() else { return String::new() };
     let number = f32::from_le_bytes(bytes);

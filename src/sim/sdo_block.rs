@@ -10,7 +10,7 @@ const BLOCK_SIZE: u8 = 127;
 pub(super) enum Block {
     /// Download: `taken` segments of this sub-block were received in order.
     Taking { value: Incoming, taken: u8 },
-    /// Download: the last segment was received, the end request not yet.
+    /// Download: the last segment was received, but not the end request.
     Taken { value: Incoming, closing: [u8; 8] },
     /// Upload: the client has not sent the start request yet.
     Offered { value: Outgoing, block_size: u8 },
@@ -73,7 +73,7 @@ impl Block {
     pub(super) fn step(self, frame: [u8; 8], longest: usize) -> Result<Step, Abort> {
         match self {
             Block::Taking { value, taken } => take(value, taken, frame, longest),
-            // The last segment repeated; it can look like an end request.
+            // The last segment was repeated. It can look like an end request.
             Block::Taken { value, closing } if frame == closing && frame != end(&value.bytes, 0, value.checked) => {
                 Ok(Step::On(Block::Taken { value, closing }, Vec::new()))
             }
@@ -119,7 +119,7 @@ fn take(mut value: Incoming, mut taken: u8, frame: [u8; 8], longest: usize) -> R
     Ok(Step::On(block, answers))
 }
 
-/// The end request of a value, in either direction; `unused` bytes of the last segment are not part of it.
+/// The end request of a value, in either direction; `unused` bytes of the last segment are not part of the value.
 fn end(value: &[u8], unused: usize, checked: bool) -> [u8; 8] {
     let [low, high] = if checked { remainder(value).to_le_bytes() } else { [0, 0] };
     let [unused, ..] = unused.to_le_bytes();

@@ -1,4 +1,4 @@
-//! The SDO server of a simulated device (CiA 301, 7.2.4): expedited, segmented and, if the description says so, block
+//! The SDO server of a simulated device (CiA 301, 7.2.4): expedited, segmented and (depending on the description) block
 //! transfers, one at a time.
 
 use super::abort::Abort;
@@ -65,7 +65,7 @@ enum Transfer {
 }
 
 impl SdoServer {
-    /// `answers_60`: [`Quirk::UploadAnswered60`](crate::device::quirk::Quirk).
+    /// `answers_60`: whether the device has [`Quirk::UploadAnswered60`](crate::device::quirk::Quirk).
     pub(super) fn new(style: SdoStyle, answers_60: bool) -> SdoServer {
         SdoServer { style, answers_60, transfer: Transfer::None }
     }
@@ -101,7 +101,7 @@ impl SdoServer {
         }
     }
 
-    /// Notes that a frame of this server was sent: the client's time limit starts with the last one.
+    /// Records that a frame of this server was sent. The time limit for the client starts with the last frame.
     pub(super) fn sent(&mut self, now: Mono) {
         if let Transfer::Block { until, .. } = &mut self.transfer {
             *until = now + SEGMENT_TIMEOUT;
@@ -117,7 +117,7 @@ impl SdoServer {
     pub(super) fn request(&mut self, now: Mono, request: [u8; 8], memory: &mut dyn Dictionary) -> Vec<[u8; 8]> {
         let [command, low, high, sub, ..] = request;
         let addressed = ObjectId { index: u16::from(high) << 8 | u16::from(low), sub };
-        // Segments contain no address: an abort names the object of the transfer, or 0000h.
+        // Segments contain no address, so an abort contains the object of the transfer, or 0000h.
         let in_transfer = self.object().unwrap_or(ObjectId::new(0, 0));
         // In a block transfer, a segment can look like any other request.
         if command != 0x80 && matches!(self.transfer, Transfer::Block { .. }) {
@@ -209,7 +209,7 @@ impl SdoServer {
         self.transfer = Transfer::None;
         let bytes = memory.upload(object)?;
         let omitted = self.style.size == SizeIndication::Omitted;
-        // Without a size, four bytes can be a short text, but an empty text cannot be shown.
+        // Without a size, a short text is filled to four bytes. An empty text cannot be sent this way.
         if (1..=4).contains(&bytes.len()) || (bytes.is_empty() && omitted) {
             let command = match (self.answers_60, self.style.size) {
                 (true, _) => 0x60,
@@ -268,7 +268,7 @@ impl SdoServer {
                 &data[..4 - usize::from(command >> 2 & 0b11)]
             } else {
                 let width = width.unwrap_or(4).min(4);
-                // A value that is too long for the type is refused, not truncated.
+                // A value that is too long for the type is rejected, not truncated.
                 if data[width..].iter().any(|&byte| byte != 0) {
                     return Err(Abort::LENGTH);
                 }
@@ -315,7 +315,7 @@ impl SdoServer {
     }
 }
 
-/// The announced size, if there is one and it is possible.
+/// The announced size, if there is a valid one.
 fn announced(sized: bool, data: [u8; 4], width: Option<usize>) -> Result<Option<usize>, Abort> {
     if !sized {
         return Ok(None);

@@ -13,7 +13,7 @@ const STANDARD: [(u8, u32); 8] =
 /// A bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BitRate {
-    /// This one, in bit/s.
+    /// A fixed bit rate in bit/s.
     At(u32),
     /// The bit rate of the bus.
     Auto,
@@ -47,9 +47,9 @@ pub(super) struct Settings {
 #[derive(Clone, Copy, Debug)]
 struct Place {
     object: ObjectId,
-    /// The object that stores it; `None` if the write itself stores.
+    /// The object that stores the value; `None` if the write itself stores it.
     store: Option<ObjectId>,
-    /// Whether only a power cycle activates it.
+    /// Whether only a power cycle activates the value.
     needs_power_cycle: bool,
 }
 
@@ -90,7 +90,7 @@ impl Settings {
         self.active = self.pending;
     }
 
-    /// Notes the bit rate of the bus. A device without a given bit rate takes it.
+    /// Records the bit rate of the bus. A device without a given bit rate uses it.
     pub(super) fn set_bus_bit_rate(&mut self, bit_rate: u32, is_given: bool) {
         if self.bus_bit_rate.is_none() && !is_given {
             for pair in [&mut self.active, &mut self.pending, &mut self.persistent] {

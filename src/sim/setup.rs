@@ -20,13 +20,13 @@ pub struct Setup {
     pub model: Arc<Model>,
     /// The simulator's data for this kind of device.
     pub sim: SimData,
-    /// Its node-ID; `None`: it is unconfigured, and only LSS reaches it.
+    /// The node-ID; `None`: the device is unconfigured and answers only LSS.
     pub node: Option<NodeId>,
-    /// Its bit rate in bit/s; `None`: the rate of the bus at its first power-on.
+    /// The bit rate in bit/s; `None`: that of the bus at the first power-on.
     pub bit_rate: Option<u32>,
     /// Its serial number.
     pub serial: u32,
-    /// Whether it becomes OPERATIONAL by itself.
+    /// Whether the device becomes OPERATIONAL by itself.
     pub start: bool,
     /// Objects with a stored value.
     pub set: Vec<(ObjectId, Scalar)>,
@@ -49,13 +49,13 @@ pub struct Oddities {
     pub lose: Vec<u8>,
     /// LSS services whose next answer is delayed, once.
     pub late: BTreeMap<u8, Duration>,
-    /// LSS services (11h, 13h, 17h) that are refused, with their error codes.
+    /// LSS services (11h, 13h, 17h) that are rejected, with their error codes.
     pub refuse: BTreeMap<u8, u8>,
-    /// Whether it answers every fastscan frame in configuration state, as CANopenNode does.
+    /// Whether the device answers every fastscan frame in configuration state, as CANopenNode does.
     pub endless_fastscan: bool,
     /// If not empty, only SDO requests for these objects are answered.
     pub answers_only: Vec<ObjectId>,
-    /// Events after which it is offline until a power cycle.
+    /// Events after which the device is offline until a power cycle.
     pub offline_after: Vec<OfflineAfter>,
 }
 

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 pub(super) const COB_ID_SYNC: u16 = 0x1005;
 pub(super) const COB_ID_EMCY: u16 = 0x1014;
-/// The period of SYNC: a device that has it can produce SYNC.
+/// The period of SYNC. A device with this object can produce SYNC.
 const SYNC_PERIOD: ObjectId = ObjectId::new(0x1006, 0);
 
 /// One TPDO.
@@ -24,7 +24,7 @@ pub(super) struct Tpdo {
     style: PdoStyle,
     /// SYNCs since the last transmission.
     syncs: u8,
-    /// The last transmission, for "if changed".
+    /// The data of the last transmission, for "if changed".
     sent: Option<Vec<u8>>,
     sent_at: Option<Mono>,
     /// When the event timer elapses.
@@ -53,11 +53,11 @@ struct Watch {
 /// The cause of a transmission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cause {
-    /// Its SYNC or its event timer.
+    /// The SYNC or the event timer of the TPDO.
     Due,
     /// A SYNC, if the values have changed.
     IfChanged,
-    /// A remote request: the count of SYNCs goes on.
+    /// A remote request. The count of SYNCs continues.
     Requested,
 }
 
@@ -107,7 +107,7 @@ impl Tpdo {
         if is_valid(cob_id) { CanId::standard(id) } else { None }
     }
 
-    /// Whether it answers remote requests with this identifier.
+    /// Whether the TPDO answers remote requests with this identifier.
     pub(super) fn answers(&self, objects: &Objects, id: CanId) -> bool {
         let refuses = objects.number(self.communication(1)) & 0x4000_0000 != 0;
         !refuses && self.cob_id(objects) == Some(id)
@@ -187,12 +187,12 @@ impl Tpdo {
         self.held_back.is_none().then_some(Cause::Due)
     }
 
-    /// The next time at which [`Tpdo::wake`] has something to do.
+    /// The next time at which [`Tpdo::wake`] must be called.
     pub(super) fn next_wake(&self) -> Option<Mono> {
         [self.timer, self.held_back, self.look].into_iter().flatten().min()
     }
 
-    /// Notes a transmission; `false` if it must not happen because nothing changed.
+    /// Records a transmission; `false` if nothing is sent, because nothing changed.
     pub(super) fn note(
         &mut self,
         cause: Cause,
@@ -240,7 +240,7 @@ impl Watch {
         })
     }
 
-    /// Whether the value changed by delta, or has just passed a limit outwards.
+    /// Whether the value changed by delta, or just crossed a limit outwards.
     fn look(&mut self, objects: &Objects, channels: &mut Channels, time: Duration) -> bool {
         let Some(value) = channels.number(objects, self.object, time) else { return false };
         let mut event = self.delta > 0.0 && (value - self.reference).abs() >= self.delta;

@@ -179,7 +179,7 @@ impl DeviceEntry {
         }
     }
 
-    /// `before`: the number of devices of this kind before it; each has its own serial number.
+    /// `before` is the number of previous devices of this kind, because each device has its own serial number.
     pub(super) fn setup(&self, seed: u64, before: u32, beside: &Path) -> Result<Setup, BenchError> {
         let mut setup = Setup::new(self.model(beside)?, self.node.unwrap_or(NodeId::MIN));
         setup.node = self.node;
@@ -223,7 +223,7 @@ impl DeviceEntry {
         Ok(setup)
     }
 
-    /// Holds a signal at a value: `pressure=0bar`, in the unit of the simulator if none is named.
+    /// Sets a signal to a constant value: `pressure=0bar`. Without a unit, the unit of the simulator is used.
     fn hold(&self, setup: &mut Setup, text: &str) -> Option<()> {
         let (name, value) = text.split_once('=')?;
         let (number, unit) =

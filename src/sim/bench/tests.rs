@@ -166,7 +166,7 @@ fn configured_faults() {
     assert!(bus.can_set_bit_rate().is_err());
     let rates: Vec<Option<u32>> = bus.stations::<Device>().map(Device::bit_rate).collect();
     assert_eq!(rates, [Some(250_000), Some(125_000)]);
-    // Without the second device of the same node-ID, which disturbs every answer.
+    // The bench without the second device of the same node-ID, because it disturbs every answer.
     let alone = &text[..text.rfind("[[device]]").expect("two devices")];
     let mut bus = Bench::from_toml(alone, Path::new("")).expect("a bench").open().expect("opened");
     let lines = [

@@ -54,7 +54,7 @@ fn the_dps_manual_changes_psi_to_bar() {
     assert_eq!(channels.read(&objects, id("6130:1"), AT), Some(vec![0x50, 0xc3, 0, 0]));
     assert!(channels.change_unit(&mut objects, id("6131:1"), Unit(0x4e_0000)));
     assert_eq!(channels.read(&objects, id("6130:1"), AT), Some(3447i32.to_le_bytes().to_vec()));
-    // Table 18: the span goes along; 100 psi are 6.895 bar.
+    // Table 18: the span is also converted; 100 psi are 6.895 bar.
     assert_eq!(objects.real(id("6149:1")), Some(6895.0));
     assert_eq!(objects.real(id("2006")), Some(6895.0));
     // A pressure cannot change to a temperature; nothing is changed.
@@ -136,7 +136,7 @@ fn limit_in_several_types_is_one_quantity() {
     };
     assert_eq!(write("6135:1", &7.5f32.to_le_bytes()), [7.5, 7500.0, 7500.0]);
     assert_eq!(write("7135:1", &6000i16.to_le_bytes()), [6.0, 6000.0, 6000.0]);
-    // Too large for an INTEGER16; the number written stays exact.
+    // Too large for an INTEGER16; the written number stays exact.
     assert_eq!(write("9135:1", &16_777_217i32.to_le_bytes())[1..], [32767.0, 16_777_217.0]);
     assert_eq!(write("6135:1", &9.5f32.to_le_bytes()), [9.5, 9500.0, 9500.0]);
     assert_eq!(write("6132:1", &[1]), [9.5, 95.0, 95.0], "decimal digits");

@@ -1,4 +1,4 @@
-//! How a simulated device takes its node-ID and bit rate.
+//! How a simulated device receives its node-ID and bit rate.
 
 use super::{Device, Phase, RECONNECT};
 use crate::bus::memory::Outbox;
@@ -13,7 +13,7 @@ use crate::sim::objects::Area;
 use crate::sim::setup::OfflineAfter;
 
 impl Device {
-    /// Sends an answer once its response time has passed.
+    /// Sends an answer after the response time.
     pub(super) fn answer(&mut self, frame: Frame, due_time: Mono, now: Mono, out: &mut Outbox) {
         if due_time <= now && self.delayed.is_empty() {
             out.send(frame);
@@ -23,7 +23,7 @@ impl Device {
         }
     }
 
-    /// Whether it answers LSS in its present state.
+    /// Whether the device answers LSS in its present state.
     pub(super) fn accepts_lss(&self) -> bool {
         let state = match self.phase {
             Phase::Unconfigured => return true,
@@ -36,7 +36,7 @@ impl Device {
         states.is_empty() || states.contains(&state)
     }
 
-    /// A request of the LSS master.
+    /// Handles a request of the LSS master.
     pub(super) fn configure(&mut self, request: [u8; 8], now: Mono, out: &mut Outbox) {
         let identity = [1, 2, 3, 4].map(|sub| self.memory.objects.number(ObjectId::new(0x1018, sub)));
         let reply = self.lss.request(request, identity, &mut self.memory.settings);
@@ -66,7 +66,7 @@ impl Device {
         }
     }
 
-    /// Waits the two delays of the LSS activation and changes the bit rate between them.
+    /// Waits for the two delays of the LSS activation, and changes the bit rate between them.
     pub(super) fn retime(&mut self, now: Mono, out: &mut Outbox) {
         let Phase::Retiming { after, switch, until } = self.phase else { return };
         if switch.is_some_and(|switch| switch <= now) {

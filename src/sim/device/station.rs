@@ -17,7 +17,7 @@ impl Station for Device {
             && !frame.is_remote()
             && let Some(request) = frame.all_eight()
         {
-            // A device that changes its bit rate only returns to the waiting state.
+            // While a device changes its bit rate, it accepts only the return to waiting state.
             let is_retiming = matches!(self.phase, Phase::Retiming { .. });
             if self.accepts_lss() || is_retiming && request[0] == 0x04 {
                 self.configure(request, now, out);
@@ -110,7 +110,7 @@ impl Station for Device {
             self.sdo.sent(now);
         }
         let Some(recorder) = &self.recorder else { return };
-        // Frames before it were dropped when the controller went off.
+        // Earlier frames were dropped when the controller was switched off.
         if let Some(place) = self.in_transit.iter().position(|(waiting, _)| waiting == frame) {
             self.in_transit.drain(..place);
             if let Some((_, lines)) = self.in_transit.pop_front() {

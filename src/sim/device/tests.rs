@@ -100,7 +100,7 @@ fn nmt_states_allow_their_services_only() {
     play(
         &mut bus,
         &[
-            // The boot-up was already being sent.
+            // The boot-up message was already being sent.
             ("000#0106", "705#00"),
             ("080#", "-"),
             ("605#4000100000000000", "585#4300100094018200"),
@@ -236,7 +236,7 @@ fn first_guarding_request_arms_life_guarding() {
         assert_eq!((frame, at - before), (&failed, 295), "{kind}: once, after the life time");
         assert_eq!(state(&mut bus), Some(State::PreOperational), "{kind}");
         play(&mut bus, &[("702#R1", "702#FF 082#0000000000000000")]);
-        // A request in time keeps it alive; a guard time of 0 disarms it.
+        // Requests in time prevent the failure; a guard time of 0 stops life guarding.
         for _ in 0..3 {
             let until = bus.now().mono + Duration::from_millis(200);
             assert_eq!(receive(&mut bus, until), Vec::<String>::new());
@@ -299,12 +299,12 @@ fn overload_during_operation() {
             ("605#4050610100000000", "585#4F50610103000000"),
             ("605#4030710100000000", "585#4B30710100800000"),
             ("605#4001100000000000", "585#4F01100081000000"),
-            // The communication restarts: the error is still pending and not a new one.
+            // The communication restarts. The error is still pending, so no emergency is sent.
             ("000#8205", "-"),
         ],
     );
     assert_eq!(receive(&mut bus, ms(700)), ["705#00"]);
-    // After a reset of the node it is sent again.
+    // After a reset of the node, the emergency is sent again.
     play(&mut bus, &[("605#4001100000000000", "585#4F01100081000000"), ("000#8105", "-")]);
     assert_eq!(receive(&mut bus, ms(1000)), ["705#00", "085#01F0810103000000"]);
 }
@@ -393,7 +393,7 @@ fn strings_are_segmented_or_expedited() {
             ("602#4018100400000000", "582#4218100404030201"),
         ],
     );
-    // Each segment has a second of its own.
+    // Each segment has its own time limit of one second.
     play(&mut bus, &[("601#4008100000000000", "581#4108100008000000")]);
     let later = |bus: &mut MemoryBus| {
         let until = bus.now().mono + Duration::from_millis(700);
@@ -459,7 +459,7 @@ fn the_seed_decides_the_frames() {
         received
     };
     let first = run(1);
-    // 4 boot-ups, 2 TPDOs for each of 50 SYNCs, 4 rounds of 4 + 1 by event timers; those at 500 ms are not complete
+    // 4 boot-ups, 2 TPDOs for each of 50 SYNCs, 4 rounds of 4 + 1 by event timers; the TPDOs at 500 ms are not complete
     // yet.
     assert_eq!(first.len(), 4 + 100 + 20);
     assert_eq!(first, run(1));

@@ -87,7 +87,7 @@ fn bit_rate_codes_follow_the_device_table() {
     let mut bed = Bed::new("mh4", Some(5), all());
     bed.play(&[("0401", "-"), ("130009", "13")]);
     assert_eq!(bed.settings.pending.rate, BitRate::Auto);
-    // Without a known table: the table of CiA 305.
+    // If the table is unknown, the table of CiA 305 is used.
     let mut bed = Bed::new("d20", Some(5), all());
     bed.play(&[("0401", "-"), ("130008", "13"), ("130005", "1301"), ("130009", "1301")]);
     assert_eq!(bed.settings.pending.rate, BitRate::At(10_000));
@@ -98,7 +98,7 @@ fn only_the_complete_address_in_order_selects() {
     let address = ["4062030000", "4150314400", "4200000100", "43224E0000"];
     let mut bed = Bed::new("mh4", Some(5), all());
     bed.play(&[(address[0], "-"), (address[1], "-"), (address[2], "-"), (address[3], "44"), ("5E", "5E05")]);
-    // In configuration state it ignores addresses; another device's address does not change that.
+    // In configuration state the slave ignores addresses, even those of other devices.
     bed.play(&[(address[0], "-"), (address[1], "-"), (address[2], "-"), (address[3], "-"), ("5E", "5E05")]);
     for (part, wrong) in [(0, "4061030000"), (1, "4150314401"), (2, "4201000100"), (3, "43234E0000")] {
         bed.play(&[("0400", "-")]);
@@ -106,7 +106,7 @@ fn only_the_complete_address_in_order_selects() {
             bed.play(&[(if index == part { wrong } else { right }, "-")]);
         }
     }
-    // The address can restart at any time.
+    // The address sequence can restart at any time.
     bed.play(&[(address[0], "-"), (address[1], "-"), (address[0], "-"), (address[1], "-")]);
     bed.play(&[(address[2], "-"), (address[3], "44"), ("0400", "-")]);
     // A part is missing, repeated or interrupted.
@@ -133,12 +133,12 @@ fn identification_by_range() {
     ask(&mut bed, 0, u32::MAX, "4F");
     ask(&mut bed, 20003, u32::MAX, "-");
     ask(&mut bed, 0, 20001, "-");
-    // In configuration state too.
+    // Also in configuration state.
     bed.play(&[("0401", "-")]);
     ask(&mut bed, 0, 20002, "4F");
 }
 
-/// The search of CiA 305: the upper bits of each part, then the complete part with the next part's number.
+/// The search of CiA 305: the upper bits of each part, then the complete part with the number of the next part.
 fn fastscan(bed: &mut Bed) -> Identity {
     let mut found = [0; 4];
     bed.play(&[("5100000000800000", "4F")]);
@@ -166,7 +166,7 @@ fn fastscan_finds_an_unconfigured_device() {
         bed.play(&[("4C", "50")]);
         assert_eq!(fastscan(&mut bed), identity);
         assert!(bed.slave.is_configuring());
-        // Once found it is silent; it takes a node-ID when it returns to waiting state.
+        // After it was found, the slave is silent. Its new node-ID takes effect when it returns to waiting state.
         bed.play(&[("5100000000800000", "-"), ("4C", "50"), ("5E", "5EFF"), ("110C", "11"), ("4C", "-")]);
         assert_eq!(bed.ask("0400").then, Then::Boot);
         bed.play(&[("5100000000800000", "-")]);

@@ -158,7 +158,7 @@ fn save_stores_the_requested_group_only() {
     objects.reset(Area::All, node(9));
     assert_eq!(objects.number(id("0x1017")), 100);
     assert_eq!(objects.number(id("0x1800:1")), 0x4000_0189, "the default follows the node-ID");
-    // Restoring takes effect with the reset.
+    // Restoring takes effect after the reset.
     objects.restore(Group::Communication);
     assert_eq!(objects.number(id("0x1017")), 100);
     objects.reset(Area::All, node(9));

@@ -43,7 +43,7 @@ fn memory() -> Memory {
     ]))
 }
 
-/// Requests and their answers; `-` means none, several answers stand side by side.
+/// Requests and their answers; `-` means no answer; several answers are separated by blanks.
 fn transcript(server: &mut SdoServer, memory: &mut Memory, lines: &[(&str, &str)]) {
     for (request, answer) in lines {
         let bytes: [u8; 8] = parse_hex(request).expect("bytes").try_into().expect("eight");
@@ -69,7 +69,7 @@ fn expedited() {
             ("4009100000000000", "47091000312E3000"),
             ("2B171000E8030000", "6017100000000000"),
             ("4017100000000000", "4B171000E8030000"),
-            // Size not indicated: as much as the type has.
+            // Size not indicated: the size of the type.
             ("2217100064000000", "6017100000000000"),
             ("4017100000000000", "4B17100064000000"),
             ("2217100000000100", "8017100010000706"),
@@ -99,7 +99,7 @@ fn sizes_omitted_as_d20_and_dps_do() {
             ("2217100064000000", "6017100000000000"),
             ("2B17100065000000", "6017100000000000"),
             ("4017100000000000", "4217100065000000"),
-            // No segmented transfer, in neither direction.
+            // Segmented transfer is rejected in both directions.
             ("4008100000000000", "8008100000000008"),
             ("2100200005000000", "8000200001000405"),
             ("6000000000000000", "8000000001000405"),
@@ -122,7 +122,7 @@ fn segmented_upload() {
             ("7000000000000000", "1D4E000000000000"),
             // The transfer has ended: a further segment is an invalid command.
             ("6000000000000000", "8000000001000405"),
-            // Wrong toggle bit: the transfer ends, and the abort names the object.
+            // Wrong toggle bit: the transfer ends, and the abort contains the object.
             ("4008100000000000", "4108100008000000"),
             ("7000000000000000", "8008100000000305"),
             ("6000000000000000", "8000000001000405"),
@@ -158,7 +158,7 @@ fn segmented_download() {
         &mut server,
         &mut memory,
         &[
-            // Without a size; a small number may come in segments, too.
+            // Without a size; a small number may also be sent in segments.
             ("2017100000000000", "6017100000000000"),
             ("0B01020000000000", "2000000000000000"),
             ("4017100000000000", "4B17100001020000"),
@@ -167,7 +167,7 @@ fn segmented_download() {
             ("0B41420000000000", "8000200010000706"),
             // The announced size does not fit the type.
             ("2117100004000000", "8017100010000706"),
-            // Toggle wrong.
+            // Wrong toggle bit.
             ("2100200009000000", "6000200000000000"),
             ("1041424344454647", "8000200000000305"),
             ("0041424344454647", "8000000001000405"),
@@ -213,7 +213,7 @@ fn block_download() {
         &mut server,
         &mut memory,
         &[
-            // Without CRC and size. The first segment is lost, the second repeated: none is in order.
+            // Without CRC and size. The first segment is lost and the second is repeated, so no segment is in order.
             ("C000200000000000", "A00020007F000000"),
             ("0241424344454647", "-"),
             ("0241424344454647", "-"),

@@ -1,4 +1,4 @@
-//! Filters as the master sees them.
+//! Tests of filters by the frames on the bus.
 
 use super::*;
 

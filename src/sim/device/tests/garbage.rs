@@ -1,4 +1,4 @@
-//! Any frames.
+//! Tests with random frames.
 
 use super::*;
 use crate::canopen::id::CanId;
@@ -21,7 +21,7 @@ fn frame() -> impl Strategy<Value = Frame> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Any frames: no panic, time advances, and after a reset every device has its factory defaults.
+    /// After random frames there is no panic, time advances, and a reset restores the factory defaults of every device.
     #[test]
     fn any_traffic_is_survived(frames in prop::collection::vec(frame(), 1..60)) {
         let kinds = [("mh4", 1), ("d20", 2), ("mc1609", 3), ("dps", 127)];

@@ -1,4 +1,4 @@
-//! Node-ID and bit rate: what a device accepts, when it becomes active, and what is stored.
+//! Tests of node-ID and bit rate: accepted values, activation and storage.
 
 use super::*;
 use std::collections::BTreeMap;
@@ -124,7 +124,7 @@ fn unconfigured_device_answers_lss_only() {
     );
     assert_eq!(later(&mut bus), ["709#00"]);
     play(&mut bus, &[("609#4000180100000000", "589#4300180189010040"), ("7E5#4C00000000000000", "-")]);
-    // It was not stored.
+    // The node-ID was not stored.
     bus.power_cycle();
     assert_eq!(later(&mut bus), [""; 0]);
 }
@@ -191,7 +191,7 @@ fn automatic_detection_reads_back_the_detected_rate() {
     later(&mut bus);
     assert_eq!((device(&mut bus).bit_rate(), device(&mut bus).stored().1), (None, None));
     play(&mut bus, &[("605#4021230000000000", "585#4321230003000000")]);
-    // Storing another group does not disable it.
+    // Storing another group does not disable automatic detection.
     play(&mut bus, &[("605#2310100173617665", "585#6010100100000000")]);
     assert_eq!(device(&mut bus).stored().1, None);
 }

@@ -1,4 +1,4 @@
-//! The record of the values sent.
+//! Tests of the record of sent values.
 
 use super::*;
 use std::sync::Mutex;
@@ -88,7 +88,7 @@ fn record_continues_after_the_controller_was_off() {
     setup.channels.iter_mut().for_each(|channel| channel.noise = 0.5);
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(Device::new(setup).expect("a device").recording(recorder.clone()));
-    // A device at another bit rate destroys every frame, until one controller after the other is bus-off.
+    // A device at another bit rate destroys every frame, until the controllers are bus-off, one after the other.
     let mut other = constant("mc1609", 11, 1.0);
     other.bit_rate = Some(500_000);
     other.set = vec![(id("0x1017"), Scalar::Integer(1000))];

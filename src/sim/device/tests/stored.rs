@@ -1,4 +1,4 @@
-//! Stored values: store, restore, node-ID, autozero.
+//! Tests of stored values: store, restore, node-ID, autozero.
 
 use super::*;
 
@@ -34,7 +34,7 @@ fn store_restore_and_reset() {
     play(&mut bus, &[("605#4031610100000000", "585#4331610100004E00")]);
 }
 
-/// The reason for the warning after a restore without a reset: nothing shows it, and a store cancels it.
+/// The reason for the warning after a restore without a reset: no object shows the restore, and a store cancels it.
 #[test]
 fn a_store_between_restore_and_reset_keeps_the_old_values() {
     for (kind, answers) in [("mh4", "43"), ("d20", "42"), ("dps", "42")] {
@@ -75,7 +75,8 @@ fn mh4_store_all_resets_the_cob_ids() {
     }
 }
 
-/// MC1609, 2.3: "After changing the Node-ID the COB-IDs of EMCY, SDO, TPDO1 … will be adjusted". The MH-4 keeps its own.
+/// MC1609, 2.3: "After changing the Node-ID the COB-IDs of EMCY, SDO, TPDO1 … will be adjusted". The MH-4 keeps its
+/// COB-IDs.
 #[test]
 fn new_node_id_resets_the_cob_ids_of_the_mc1609() {
     for (kind, tpdo, emcy) in
@@ -86,7 +87,7 @@ fn new_node_id_resets_the_cob_ids_of_the_mc1609() {
         ask(&mut bus, "605#23001801AA010040");
         ask(&mut bus, "605#2314100090000000");
         assert_eq!(ask(&mut bus, if kind == "mh4" { "605#2310100273617665" } else { "605#2310100173617665" }).len(), 1);
-        // The same node-ID keeps them.
+        // A write of the same node-ID does not change the COB-IDs.
         assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
         assert_eq!(ask(&mut bus, "605#4000180100000000"), ["585#43001801AA010040"], "{kind}");
         play(
@@ -128,7 +129,7 @@ fn signed_node_id_is_active_after_store_and_reset() {
             ("603#4000180100000000", "583#4300180183010040"),
         ],
     );
-    // D-20-9: only the names of these objects are known; they act like those of the MH-4.
+    // D-20-9: only the names of these objects are known. The simulator treats them as those of the MH-4.
     let mut d20 = self::bus([constant("d20", 2, 5.0)]);
     play(
         &mut d20,

@@ -1,4 +1,4 @@
-//! The causes of TPDOs, and their contents.
+//! Tests of the causes and contents of TPDOs.
 
 use super::*;
 
@@ -87,7 +87,7 @@ fn mh4_mapping_needs_an_invalid_pdo() {
     play(
         &mut bus,
         &[
-            // 3.4.2, preceded by each step out of order.
+            // The steps of 3.4.2; before each step, a step in the wrong order.
             ("601#2F001A0000000000", "701#00 581#80001A0000000106"),
             ("601#2300180182010040", "581#8000180130000906"),
             ("601#23001801810100C0", "581#6000180100000000"),
@@ -267,7 +267,7 @@ fn passing_a_limit_sends_once() {
 
 #[test]
 fn hysteresis_prevents_repeated_events() {
-    // 5 ± 1 never returns by 2: each limit is passed once.
+    // 5 ± 1 never returns by the hysteresis of 2, so each limit is passed only once.
     let mut setup = constant("mh4", 5, 5.0);
     setup.channels[0].amplitude = 1.0;
     setup.channels[0].period_s = 1.0;
@@ -362,7 +362,7 @@ fn inhibit_time_separates_events() {
         setup.start = true;
         bus([setup])
     };
-    // Without it, 4 / 0.1 = 40 events in a second, the fastest after 16 ms.
+    // Without the inhibit time: 4 / 0.1 = 40 events in a second, the fastest after 16 ms.
     let mut free = run(0);
     assert!((36..=40).contains(&timed(&mut free, ms(1000)).len()));
     let mut held = run(2000);
@@ -370,7 +370,7 @@ fn inhibit_time_separates_events() {
     let gaps: Vec<u128> = received[1..].windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
     assert!(received.len() > 8 && gaps.iter().all(|gap| *gap >= 200), "{gaps:?}");
     assert!(gaps.contains(&200), "what was held back is sent as soon as it may: {gaps:?}");
-    // It can be changed only while the PDO is not valid.
+    // The inhibit time can be changed only while the PDO is not valid.
     play(&mut held, &[("605#2B00180300000000", "585#8000180330000906")]);
     ask(&mut held, "605#2300180185010080");
     assert!(ask(&mut held, "605#2B00180300000000").contains(&"585#6000180300000000".to_owned()));
