@@ -75,7 +75,7 @@ pub struct Options {
 pub struct Zeroed {
     /// The CiA 404 channel.
     pub channel: u8,
-    /// Its name.
+    /// The name of the channel.
     pub signal: String,
     /// The unit of all numbers, in ASCII; empty if the device reports none.
     pub unit: String,
@@ -87,11 +87,11 @@ pub struct Zeroed {
     pub offset_before: Option<Number>,
     /// The offset after; `None` if none can be read, or nothing was changed.
     pub offset: Option<Number>,
-    /// Whether it was stored.
+    /// Whether the zero was stored.
     pub stored: bool,
     /// The number of decimal digits to show.
     pub decimals: usize,
-    /// Notes: skipped checks, how to undo it, whether it is stored.
+    /// Notes: skipped checks, how to undo the change, whether the zero is stored.
     pub notes: Vec<Note>,
 }
 
@@ -406,7 +406,7 @@ impl<'a> Procedure<'a> {
     }
 }
 
-/// The group of settings with the offset: the application settings, if the device can store them separately.
+/// The store group that contains the offset: the application settings, if the device can store them separately.
 fn group(master: &mut Master<'_>, device: &Node, channel: &Channel, stores: bool) -> Result<Group, Failure> {
     let described = device.model.iter().flat_map(|model| &model.description.objects);
     let entry = described

@@ -27,11 +27,11 @@ use std::time::Duration;
 pub struct CheckOptions {
     /// The nodes.
     pub nodes: Vec<NodeId>,
-    /// Skip a node without the signal if another node has it.
+    /// Whether a node without the signal is skipped if another node has it.
     pub skip_unsupported: bool,
-    /// All must be satisfied.
+    /// The expressions, which must all be satisfied.
     pub expressions: Vec<Expression>,
-    /// Record with this mode, for this time or until the end of a replayed recording. `None`: one reading by SDO.
+    /// The mode and duration of a recording (no duration: until the end of a replayed one). `None`: one reading by SDO.
     pub recording: Option<(Mode, Option<Duration>)>,
     /// Descriptions given by the user.
     pub overrides: Overrides,
@@ -44,9 +44,9 @@ pub struct CheckReport {
     pub verdicts: Vec<Verdict>,
     /// When the first value was received.
     pub started: Option<Stamp>,
-    /// From the first value to the last one.
+    /// The time from the first to the last value.
     pub length: Duration,
-    /// Why values are missing. [`Reason::Failed`] refers to these.
+    /// The failures that caused missing values. [`Reason::Failed`] is an index into this list.
     pub failures: Vec<Failure>,
     /// Further observations.
     pub remarks: Vec<Remark>,
@@ -84,8 +84,7 @@ impl CheckReport {
 /// Checks that all verdicts are good.
 ///
 /// # Errors
-/// `check-failed` if an expression is not satisfied. Otherwise, if data is missing: the failure that all missing data
-/// has in common, else `no-answer`.
+/// `check-failed` if an expression is not satisfied. If data is missing: the common failure of all missing data, else `no-answer`.
 pub fn all_satisfied(verdicts: &[Verdict], failures: &[Failure]) -> Result<(), Failure> {
     let failed: Vec<Verdict> = verdicts.iter().filter(|verdict| verdict.outcome == Outcome::Fail).cloned().collect();
     let without = verdicts.iter().filter(|verdict| verdict.outcome == Outcome::NoData).count();
@@ -245,7 +244,7 @@ pub struct Checker<'a> {
     skip_unsupported: bool,
     /// The nodes whose setup could not be read, in the order of [`RecordingReport::failed`].
     failed: Vec<NodeId>,
-    /// The devices were known before the recording.
+    /// Whether the devices were known before the recording.
     is_bound: bool,
     /// The sources with at least one sample, if the devices were not known before: the units of other sources may
     /// still be unknown.

@@ -18,7 +18,7 @@ use std::collections::BTreeSet;
 pub struct Draft {
     /// Identity, signals and TPDOs.
     pub node: Node,
-    /// The objects that it has, in ascending order.
+    /// The objects of the device, in ascending order.
     pub objects: Vec<DraftObject>,
 }
 
@@ -31,17 +31,17 @@ pub struct DraftObject {
     pub name: Option<String>,
     /// Whether several sub-indices have this name.
     pub is_numbered: bool,
-    /// `None` if no source states it.
+    /// The data type; `None` if no source states it.
     pub data_type: Option<DataType>,
     /// Access by SDO.
     pub access: Access,
-    /// The value that was read; `None` for an object that only the EDS names.
+    /// The value read; `None` for an object that only the EDS contains.
     pub value: Option<Value>,
     /// Whether a TPDO can contain it.
     pub pdo: bool,
 }
 
-/// Channels of CiA 404 whose objects are looked for.
+/// The number of channels of CiA 404 whose objects are searched.
 const MAX_CHANNELS: usize = 16;
 
 /// The indices of a channel in each family of CiA 404, without the first digit.

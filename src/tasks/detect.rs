@@ -1,4 +1,4 @@
-//! Finds the bit rate of a running bus: by listening, or by asking on a bench with one device.
+//! Finds the bit rate of a running bus by listening, or by sending requests to a single device.
 
 mod failure;
 
@@ -23,7 +23,7 @@ pub const RATES: [u32; 9] = [250_000, 125_000, 500_000, 1_000_000, 100_000, 50_0
 /// This many valid frames prove a bit rate.
 const ENOUGH_FRAMES: u32 = 3;
 
-/// After this many errors without a valid frame, a bit rate is given up.
+/// A bit rate is rejected after this many errors without a valid frame.
 const ENOUGH_ERRORS: u32 = 50;
 
 /// The most bits that a request occupies on the bus, with bit stuffing.
@@ -34,7 +34,7 @@ const REQUEST_BITS: u64 = 135;
 pub enum How {
     /// By listening: no frame, no acknowledgement and no error flag was sent.
     Listening,
-    /// By asking each node-ID for its device type.
+    /// By reading the device type of each node-ID.
     Asking,
 }
 
@@ -43,13 +43,13 @@ pub enum How {
 pub struct Tried {
     /// The bit rate in bit/s.
     pub bit_rate: u32,
-    /// How it was tried.
+    /// How the bit rate was tried.
     pub how: How,
     /// The valid frames that were received.
     pub frames: u32,
     /// The errors that the controller reported.
     pub errors: u32,
-    /// All requests were sent without an error, so another node acknowledged them.
+    /// Whether all requests were sent without an error, so that another node acknowledged them.
     pub acknowledged: bool,
     /// Why the interface cannot be set to this bit rate; `None` if it can.
     pub impossible: Option<String>,
@@ -76,7 +76,7 @@ impl Tried {
 pub enum By {
     /// Valid frames.
     Frames,
-    /// Requests were acknowledged at this bit rate only, and no node answered.
+    /// Requests were acknowledged only at this bit rate, but no node answered.
     Acknowledge,
 }
 
@@ -89,14 +89,14 @@ pub struct Detection {
     pub tried: Vec<Tried>,
 }
 
-/// Tries the usual bit rates one after the other, each for `time_per_rate`, the present one first. Then sets the
-/// interface back.
+/// Tries the usual bit rates, the present one first, each for `time_per_rate`. Then restores the interface.
 ///
-/// It listens. If `ask` is set and no frame is received, it asks as well, which disturbs a bus that runs at another bit
-/// rate. `on_tried` receives the result of each try.
+/// First it only listens. If
+/// `ask` is set and no frame is received, it sends requests, which disturbs a bus with another bit rate. `on_tried`
+/// receives the result of each try.
 ///
 /// # Errors
-/// The interface cannot be set or set back; Ctrl-C.
+/// The interface cannot be set or restored; Ctrl-C.
 pub fn detect(
     bus: &mut dyn Bus,
     ask: bool,
@@ -141,7 +141,7 @@ fn try_all(
     let mut tried: Vec<Tried> = Vec::new();
     for &bit_rate in &rates {
         let one = match listen(bus, bit_rate, time_per_rate) {
-            // Without a listen-only mode, only asking is left.
+            // Without a listen-only mode, only requests can be tried.
             Err(Error::Bus(BusError::Unsupported(_))) if ask && tried.is_empty() => break,
             one => one?,
         };
@@ -166,7 +166,7 @@ fn try_all(
     Ok(Detection { found: found.map(|bit_rate| (bit_rate, By::Acknowledge)), tried })
 }
 
-/// Sets a bit rate. Returns false and notes the reason if the interface cannot do it.
+/// Sets a bit rate. If the interface does not support the bit rate, returns false and records the reason.
 fn set(bus: &mut dyn Bus, mode: Mode, tried: &mut Tried) -> Result<bool, BusError> {
     match bus.set_bit_rate(tried.bit_rate, mode) {
         Ok(()) => Ok(true),
@@ -206,7 +206,7 @@ fn ask_all(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<
     let mut pending: BTreeSet<Ticket> = NodeId::all()
         .map(|node| master.start(Request::read(node, ObjectId::DEVICE_TYPE).once().within(time_per_rate)))
         .collect();
-    // On a slow bus the requests alone take longer than the answers.
+    // On a slow bus, the requests take longer than the answers.
     let requests = u64::try_from(pending.len()).unwrap_or(0);
     let on_the_wire = REQUEST_BITS * requests * 1_000_000 / u64::from(bit_rate.max(1));
     let until = master.now() + time_per_rate + Duration::from_micros(on_the_wire);
@@ -228,7 +228,7 @@ fn ask_all(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<
         }
         if tried.is_found() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    // A full queue is expected at all bit rates but one: no node acknowledges the requests.
+    // A full queue is expected at wrong bit rates, because no node acknowledges the requests.
     let is_full = matches!(waited, Err(Error::Bus(BusError::QueueFull)));
     tried.acknowledged = !is_full && !master.is_sending() && tried.errors == 0;
     master.forget(pending.into_iter());

@@ -1,8 +1,7 @@
 //! Why a node sends no measurements.
 //!
-//! [`diagnose`] decides from evidence, in this order: its last frames ([`Heard`]), its present answers
-//! ([`Inquiry`]), and the parameters of the TPDOs that carry the requested signals. Causes that cannot be distinguished are
-//! named together: see [`Running`].
+//! [`diagnose`] decides from evidence, in this order: the last frames of the node ([`Heard`]), its present answers
+//! ([`Inquiry`]), and the parameters of the TPDOs with the requested signals. Causes that cannot be distinguished are reported together: see [`Running`].
 
 mod inquiry;
 
@@ -28,18 +27,18 @@ pub struct Silence {
     pub cause: SilenceCause,
     /// The code of the last emergency of the node.
     pub emergency: Option<u16>,
-    /// Whether the node is OPERATIONAL. Set for causes that leave doubt: a node in another state is silent as well.
+    /// Whether the node is OPERATIONAL. Reported with uncertain causes, because a node in another state is also silent.
     pub running: Running,
 }
 
-/// Whether a node is OPERATIONAL, as far as it is known. A node that is known to be in another state has another cause.
+/// Whether a node is OPERATIONAL, as far as known. If another state is known, that state is the cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Running {
-    /// It is OPERATIONAL.
+    /// The node is OPERATIONAL.
     Operational,
-    /// It answers SDO requests: it is OPERATIONAL or PRE-OPERATIONAL.
+    /// The node answers SDO requests, so it is OPERATIONAL or PRE-OPERATIONAL.
     NotStopped,
-    /// Nothing.
+    /// The state is unknown.
     Unknown,
 }
 
@@ -50,27 +49,28 @@ pub enum SilenceCause {
     InterfaceDown,
     /// The node restarted, and its setup could not be read again.
     NotReadAgain,
-    /// Its value could not be polled.
+    /// The value could not be polled.
     PollFailed(Box<SdoError>),
-    /// It is not operational.
+    /// The node is not operational.
     NotOperational {
-        /// Its state.
+        /// The state.
         state: NmtState,
         /// The evidence for the state.
         by: Proof,
-        /// Whether it had been started before.
+        /// Whether the node was started before.
         was_started: bool,
     },
-    /// It restarted, and has not been operational since.
+    /// The node restarted, and has not been operational since then.
     Restarted,
-    /// It sends no heartbeat, and does not answer. With `had_heartbeat` its heartbeat stopped, so it is not in STOPPED.
+    /// The node sends no heartbeat and does not answer. With `had_heartbeat`, the heartbeat stopped, so the node is not
+    /// in STOPPED.
     Unreachable {
-        /// Whether it has a heartbeat.
+        /// Whether the node had a heartbeat.
         had_heartbeat: bool,
     },
-    /// Its heartbeat stopped. Nothing was asked since.
+    /// The heartbeat stopped, and no request was sent since then.
     HeartbeatStopped,
-    /// Its TPDOs have another length than their mapping, in bytes.
+    /// The length of its TPDOs differs from their mapping, in bytes.
     WrongLength {
         /// The length of the mapping.
         mapped: usize,
@@ -79,7 +79,7 @@ pub enum SilenceCause {
     },
     /// Another node sends TPDOs with the same COB-ID.
     SharedCobId(CanId, NodeId),
-    /// It has no TPDO.
+    /// The node has no TPDO.
     NoTpdo,
     /// The TPDO is not sent.
     Tpdo(TpdoNumber, TpdoCause),
@@ -88,49 +88,50 @@ pub enum SilenceCause {
 /// Why a TPDO is not sent, by its parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TpdoCause {
-    /// Bit 31 of the COB-ID is set in all TPDOs of the node; this is the first one.
+    /// Bit 31 of the COB-ID is set in all TPDOs of the node; reported for the first one.
     Disabled,
-    /// No object is mapped; the value of 1Axxh:0, if it was read: FEh and FFh stand for multiplexed PDOs.
+    /// No object is mapped. The number is 1Axxh:0, if it was read: FEh and FFh mean multiplexed PDOs.
     NothingMapped(Option<u8>),
-    /// It is sent on remote request only (transmission type 252 or 253).
+    /// The TPDO is sent only on remote request (transmission type 252 or 253).
     OnlyOnRequest(u8),
-    /// It waits for SYNC with this COB-ID, and none was received or sent.
+    /// The TPDO waits for SYNC with this COB-ID, but no SYNC was received or sent.
     WaitsForSync(CanId),
-    /// SYNC has a counter and the node expects none, or the other way round.
+    /// SYNC has a counter but the node expects none, or vice versa.
     SyncCounter {
         /// Whether the node expects a counter.
         is_expected: bool,
     },
     /// The node reports that SYNC has an unexpected length (emergency 8240h).
     SyncRejected,
-    /// It is sent at every n-th SYNC, and fewer were seen.
+    /// The TPDO is sent at every n-th SYNC, but fewer SYNC messages were received.
     TooFewSyncs {
-        /// n.
+        /// The number n.
         every: u8,
-        /// SYNC messages seen.
+        /// The number of SYNC messages received.
         seen: u64,
     },
-    /// It is sent at a SYNC after a change only, and its value is steady.
+    /// The TPDO is sent only at a SYNC after a change, and its value is steady.
     SteadyAtSync,
-    /// It was requested, and was not received.
+    /// The TPDO was requested, but not received.
     NotSentOnRequest,
-    /// It is sent at SYNC; SYNC was sent, and it was not received.
+    /// The TPDO is sent at SYNC. SYNC was sent, but the TPDO was not received.
     NotSentAtSync,
-    /// Its event timer in milliseconds is longer than the time waited.
+    /// The event timer in milliseconds is longer than the waiting time.
     SlowEventTimer(u16),
-    /// Its inhibit time in multiples of 100 µs is longer than the time waited.
+    /// The inhibit time in multiples of 100 µs is longer than the waiting time.
     InhibitTime(u16),
     /// The channel of its value is switched off by this object (6112h).
     ChannelOff(ObjectId),
     /// The node sends analogue inputs only if this object is 1 (6423h of CiA 401).
     InterruptsDisabled(ObjectId),
-    /// It has no event timer, and no change triggers it: delta and limits are 0, from the first to the last of these objects.
+    /// The event timer is 0, and delta and limits are 0, so nothing triggers the TPDO. The objects are the first and
+    /// the last of delta and limits.
     NoTrigger(ObjectId, ObjectId),
-    /// It has no event timer, and is sent on change only.
+    /// The event timer is 0, and the TPDO is sent only on change.
     SendsOnChange,
-    /// Its event timer in milliseconds is running, and it was not received.
+    /// The event timer (in milliseconds) is set, but the TPDO was not received.
     Due(u16),
-    /// Its transmission type cannot be read.
+    /// The transmission type cannot be read.
     UnknownType,
 }
 
@@ -139,28 +140,28 @@ pub enum TpdoCause {
 pub struct Heard {
     /// The state of its last heartbeat; `None` after a boot-up.
     pub state: Option<NmtState>,
-    /// Its last heartbeat or boot-up message was a boot-up message.
+    /// Whether the latest heartbeat or boot-up message was a boot-up message.
     pub booted: bool,
-    /// It was operational once.
+    /// Whether the node was operational before.
     pub was_operational: bool,
-    /// Its heartbeat stopped.
+    /// Whether its heartbeat stopped.
     pub heartbeat_stopped: bool,
     /// The code of its last emergency.
     pub emergency: Option<u16>,
-    /// It sent TPDOs: it is operational.
+    /// Whether the node sent TPDOs, and so is operational.
     pub sends_tpdos: bool,
-    /// SYNC messages for it that others sent, and the length of the last one.
+    /// SYNC messages from other nodes: their number, and the length of the last one.
     pub syncs: (u64, usize),
-    /// The mapped and the received length in bytes of TPDOs that make no values.
+    /// The mapped and the received length in bytes of ignored TPDOs.
     pub wrong_length: Option<(usize, usize)>,
-    /// A COB-ID with which another node sends TPDOs too.
+    /// A COB-ID with which another node also sends TPDOs.
     pub shared: Option<(CanId, NodeId)>,
 }
 
 /// The way in which measurements were requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Situation {
-    /// How long it waited.
+    /// The waiting time.
     pub waited: Duration,
     /// SYNC messages that the program sent; `None` if it sends no SYNC.
     pub syncs_sent: Option<u64>,
@@ -201,7 +202,7 @@ pub fn diagnose(
     Silence { cause, emergency: heard.emergency, running }
 }
 
-/// Why the TPDOs that were received make no values.
+/// Why the received TPDOs give no values.
 fn frames_cause(heard: &Heard) -> SilenceCause {
     match (heard.wrong_length, heard.shared) {
         (Some((mapped, received)), _) => SilenceCause::WrongLength { mapped, received },
@@ -229,7 +230,7 @@ fn setup_cause(
     let known = findings.unwrap_or(&empty);
     let causes: Vec<(TpdoNumber, TpdoCause)> =
         candidates.iter().map(|tpdo| (tpdo.number, tpdo_cause(node, tpdo, heard, known, situation))).collect();
-    // A TPDO that is due and is not sent shows that the parameters of the others are not the cause.
+    // If a due TPDO is not sent, the parameters of the other TPDOs are not the cause.
     let is_due = |cause: &TpdoCause| {
         matches!(
             cause,
@@ -286,7 +287,7 @@ fn event_cause(node: &Node, tpdo: &Tpdo, findings: &Findings, waited: Duration) 
     }
 }
 
-/// All channels of a TPDO are off.
+/// The cause, if all channels of a TPDO are off.
 fn channel_off(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<TpdoCause> {
     let modes: Vec<ObjectId> =
         tpdo.mapping.iter().filter_map(|entry| inquiry::operating_mode(node, entry.object)).collect();
@@ -299,7 +300,7 @@ fn interrupts_disabled(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<
     (findings.is_zero(enable) == Some(true)).then_some(TpdoCause::InterruptsDisabled(enable))
 }
 
-/// The deltas and limits of all values of a TPDO were read, and are 0. An object that does not exist triggers nothing.
+/// The cause, if the deltas and limits of all values of a TPDO were read and are 0. A missing object triggers nothing.
 fn no_trigger(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<TpdoCause> {
     let values: Vec<[ObjectId; 3]> =
         tpdo.mapping.iter().filter_map(|entry| inquiry::triggers(node, entry.object)).collect();

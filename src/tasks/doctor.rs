@@ -1,6 +1,6 @@
 //! Finds out why a node or the whole bus is silent. Changes nothing on the nodes.
 //!
-//! The reasons of silent signals are those of `log` and `check`: a recording without NMT commands finds them.
+//! The reasons for silent signals are those of `log` and `check`, from a recording without NMT commands.
 
 use crate::bus::{Fault, Filters, Stamp};
 use crate::canopen::id::NodeId;
@@ -23,10 +23,10 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// How long is listened for nodes before the observation, if nothing may be sent.
+/// The time to listen for nodes before the observation, if nothing may be sent.
 const LISTEN: Duration = Duration::from_secs(3);
 
-/// How long heartbeats and TPDOs are observed: `log` reports the reasons of silent nodes after the same time.
+/// The time to observe heartbeats and TPDOs. `log` reports the reasons of silent nodes after the same time.
 const OBSERVATION: Duration = Duration::from_secs(5);
 
 /// What to examine.
@@ -46,18 +46,18 @@ pub struct DoctorOptions {
     pub overrides: Overrides,
 }
 
-/// Something that is wrong.
+/// A problem that was found.
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// The node; `None` for the bus.
     pub node: Option<NodeId>,
-    /// The signal, if the node sends others.
+    /// The signal, if the node sends other signals.
     pub signal: Option<String>,
-    /// What is wrong.
+    /// The problem.
     pub cause: FindingCause,
 }
 
-/// What is wrong.
+/// The problem.
 #[derive(Clone, Debug)]
 pub enum FindingCause {
     /// A request failed.
@@ -66,21 +66,21 @@ pub enum FindingCause {
     Silent(Box<Silence>),
     /// No frame was received within this time.
     NoFrame(Duration),
-    /// It sends frames, and no TPDO, while nothing is sent to it.
+    /// The node sends frames but no TPDO, and the program sent no request.
     NoTpdo,
-    /// Frames are received, and none comes from a CANopen node.
+    /// Frames are received, but none from a CANopen node.
     NoNode,
-    /// No node answers, and a device without a node-ID does (LSS).
+    /// No node answers, but a device without a node-ID does (LSS).
     Unconfigured,
     /// The node sends nothing and does not answer; these nodes are on the bus.
     Absent(Vec<NodeId>),
-    /// The node sends heartbeats with this state, and does not answer SDO requests.
+    /// The node sends heartbeats with this state, but does not answer SDO requests.
     OnlyHeartbeat(NmtState),
-    /// The controller reported this, and whether a node answered: the bit rate is then right.
+    /// The controller reported this fault. The flag is `true` if a node answered, so that the bit rate is right.
     Fault(Fault, bool),
     /// A value has this status.
     Status(Status),
-    /// The error register in words.
+    /// The set bits of the error register.
     Register(String),
     /// An observation of the recording.
     Remark(Remark),
@@ -91,7 +91,7 @@ pub enum FindingCause {
 pub struct Examination {
     /// The nodes that were found.
     pub nodes: Vec<NodeId>,
-    /// What is wrong, the bus first.
+    /// The problems, those of the bus first.
     pub findings: Vec<Finding>,
 }
 
@@ -100,7 +100,7 @@ impl Examination {
         self.findings.push(Finding { node, signal: None, cause });
     }
 
-    /// A failure of a request. Each is listed once.
+    /// Adds the failure of a request. Each failure is listed once.
     fn failed(&mut self, failure: Failure) {
         let silent = match &failure.cause {
             Cause::Log(LogFailure::NoMeasurements { nodes, .. }) => nodes.clone(),
@@ -116,7 +116,7 @@ impl Examination {
     }
 
     fn silent(&mut self, node: NodeId, signal: Option<String>, silence: Silence) {
-        // A node that sends others is not silent if a value does not change.
+        // A node that sends other signals is not silent if a value does not change.
         let is_normal = signal.is_some()
             && silence.running == Running::Operational
             && matches!(
@@ -135,7 +135,7 @@ impl Examination {
 /// Examines a node, or every node of the bus.
 ///
 /// # Errors
-/// Ctrl-C. Everything else is a finding.
+/// Ctrl-C. Any other failure is a finding.
 pub fn examine(master: &mut Master<'_>, options: &DoctorOptions) -> Result<Examination, Failure> {
     let mut examination = Examination::default();
     match examine_bus(master, options, &mut examination) {
@@ -173,7 +173,7 @@ fn examine_bus(master: &mut Master<'_>, options: &DoctorOptions, examination: &m
     if options.passive { Ok(()) } else { read_values(master, options, &answering, examination) }
 }
 
-/// A node that sends heartbeats, or another sign of life, and does not answer.
+/// The problem of a node that sends heartbeats or another sign of life, but does not answer.
 fn only_heartbeat(state: Option<NmtState>) -> FindingCause {
     match state {
         Some(NmtState::Stopped) => FindingCause::Silent(Box::new(not_operational(NmtState::Stopped))),
@@ -182,18 +182,18 @@ fn only_heartbeat(state: Option<NmtState>) -> FindingCause {
     }
 }
 
-/// A node whose heartbeat shows another state than OPERATIONAL.
+/// The problem of a node whose heartbeat shows a state other than OPERATIONAL.
 fn not_operational(state: NmtState) -> Silence {
     let cause = SilenceCause::NotOperational { state, by: Proof::Heartbeat, was_started: false };
     Silence { cause, emergency: None, running: Running::Unknown }
 }
 
-/// A node that answered before, and whose heartbeat shows now that it is stopped.
+/// Whether a node answered before, and its heartbeat now shows STOPPED.
 fn is_stopped(error: &SdoError) -> bool {
     matches!(error.failure, SdoFailure::NoAnswer { missed: MissedAnswer { state: Some(NmtState::Stopped), .. }, .. })
 }
 
-/// Why nothing was heard of the requested nodes.
+/// Why nothing was received from the requested nodes.
 fn why_absent(
     master: &mut Master<'_>,
     options: &DoctorOptions,
@@ -205,7 +205,7 @@ fn why_absent(
     let is_alone = others.is_empty() && frames == 0;
     faults.iter().for_each(|&fault| examination.add(None, FindingCause::Fault(fault, false)));
     if let Some(node) = options.node.filter(|_| !options.passive) {
-        // The request once more: its failure shows what was received instead of an answer.
+        // The request is repeated, because its failure contains the frames received instead of an answer.
         master.listen_to(&[node])?;
         match master.transfer_one(Request::read(node, ObjectId::DEVICE_TYPE))? {
             Err(error) if matches!(error.failure, SdoFailure::NoAnswer { missed, .. } if missed.frame.is_none()) => {}
@@ -276,7 +276,7 @@ fn record(
             return Ok(());
         }
     };
-    // The nodes were heard before, so a recording without a TPDO does not mean that nothing was received.
+    // Frames of the nodes were received before, so a recording without TPDOs does not mean that nothing was received.
     let nothing = report.nothing.filter(|failure| {
         let is_unheard = matches!(failure.cause, Cause::Log(LogFailure::NothingReceived { .. }));
         for &node in nodes.iter().filter(|_| is_unheard) {
@@ -312,7 +312,7 @@ fn read_values(
     nodes: &[NodeId],
     examination: &mut Examination,
 ) -> Result<(), Failure> {
-    // Nodes that cannot be read were reported by the recording.
+    // The recording has already reported nodes that cannot be read.
     for readings in read(master, nodes, &[], &options.overrides)?.into_iter().flatten() {
         for (target, sample) in readings {
             let bad = sample.status.filter(|&status| status != Status::Ok);

@@ -1,4 +1,4 @@
-//! The contents of TPDOs as other programs describe them: bits, factor, offset and unit of each signal.
+//! The contents of TPDOs for other programs: bits, factor, offset and unit of each signal.
 
 use super::Failure;
 use crate::canopen::id::{CanId, NodeId};
@@ -46,13 +46,13 @@ pub struct MessageSignal {
     pub bits: u8,
     /// The type of the number.
     pub data_type: DataType,
-    /// From the number to the value.
+    /// The scaling from the number to the value.
     pub scale: Scale,
     /// The unit; `None` if it has none or if it is unknown.
     pub unit: Option<Unit>,
 }
 
-/// Reads the valid TPDOs of nodes. The second part of the result are nodes that could not be read.
+/// Reads the valid TPDOs of nodes. The second part of the result contains the failures of the other nodes.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.

@@ -1,6 +1,6 @@
 //! Why a task failed: the node, the object, the cause, and the changes before the failure.
 //!
-//! These types contain no text for people. [`crate::output::failure`] turns them into a message and a hint.
+//! These types contain no text. [`crate::output::failure`] converts them to a message and a hint.
 
 pub use crate::bus::BusError;
 pub use crate::master::{LssError, MissedAnswer, Operation, SdoError, SdoFailure, SecondAnswer};
@@ -37,14 +37,14 @@ pub enum Kind {
     Partial,
     /// A local file could not be opened, read or written.
     Io,
-    /// Ctrl-C before there was a result.
+    /// Ctrl-C before a result.
     Interrupted,
 }
 
 /// Why a task failed.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// The node that it concerns; `None` if it concerns none or several.
+    /// The affected node; `None` for no node or several nodes.
     pub node: Option<NodeId>,
     /// The object that was read or written.
     pub object: Option<ObjectId>,
@@ -54,7 +54,7 @@ pub struct Failure {
     pub effects: Vec<Effect>,
 }
 
-/// The cause of a failure. Each area of `tasks` has an enum of its own.
+/// The cause of a failure. Each area of `tasks` has its own enum.
 #[derive(Clone, Debug)]
 pub enum Cause {
     /// The bus failed.
@@ -71,7 +71,7 @@ pub enum Cause {
     Interrupted,
     /// An expression of `check` or `log --expect` is wrong.
     Expression(Box<ExpressionError>),
-    /// No manual page supports the description with this name, and the user did not name it.
+    /// No manual confirms the description with this name, and the user did not name it.
     Unconfirmed(String),
     /// Measured values could not be read.
     Read(read::ReadFailure),
@@ -194,7 +194,7 @@ fn changes_slave(service: Service) -> bool {
 }
 
 impl Failure {
-    /// A failure that concerns no single node.
+    /// A failure that does not belong to a single node.
     pub fn general(cause: impl Into<Cause>) -> Failure {
         Failure { node: None, object: None, cause: cause.into(), effects: Vec::new() }
     }
@@ -219,7 +219,7 @@ impl Failure {
         self
     }
 
-    /// The same failure of a write, with the rule of the device that the number breaks, if the device rejected it.
+    /// The same failure of a write. If the device rejected the number, the violated rule of the description is added.
     #[must_use]
     pub fn explained(self, node: &Node, object: ObjectId, data: &[u8]) -> Failure {
         match self.abort().and_then(|_| Rule::broken(node, object, data)) {
@@ -239,7 +239,7 @@ impl Failure {
     }
 }
 
-/// Refuses to change a device by a description that no manual page supports, unless the user named it.
+/// Rejects a change of a device by a description that no manual confirms, unless the user named the description.
 pub fn check_confirmed(node: Option<NodeId>, model: Option<&Model>) -> Result<(), Failure> {
     let unconfirmed = model.map(|model| &model.description).filter(|description| description.unconfirmed);
     match unconfirmed {
@@ -248,8 +248,8 @@ pub fn check_confirmed(node: Option<NodeId>, model: Option<&Model>) -> Result<()
     }
 }
 
-/// Two failures are equal if all their parts are. Errors of the operating system cannot be compared, so the debug form
-/// of the cause is.
+/// Failures are equal if all their parts are equal. The debug form of the cause is compared, because errors of the
+/// operating system have no comparison.
 impl PartialEq for Failure {
     fn eq(&self, other: &Failure) -> bool {
         let same_place = (self.node, self.object) == (other.node, other.object);
@@ -257,7 +257,7 @@ impl PartialEq for Failure {
     }
 }
 
-/// For logs and tests. People read the text of [`crate::output::failure`].
+/// The text for logs and tests. Users see the text of [`crate::output::failure`].
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(node) = self.node {

@@ -13,7 +13,7 @@ pub enum HostAction {
         interface: String,
         /// The bit rate in bit/s; `None` keeps the present one.
         bit_rate: Option<u32>,
-        /// Whether it is to be listen-only.
+        /// Whether to set listen-only mode.
         listen_only: bool,
     },
     /// Bring it down.
@@ -38,14 +38,14 @@ pub enum HostFailure {
         /// The action.
         action: HostAction,
     },
-    /// The interface, its driver or this system cannot do it.
+    /// The interface, its driver or this system does not support the action.
     Unsupported {
         /// The reason.
         reason: String,
         /// The action.
         action: HostAction,
     },
-    /// The interface has no bit rate yet, and none was given.
+    /// The interface has no bit rate yet, and the user gave none.
     NoBitRate {
         /// Its name.
         interface: String,

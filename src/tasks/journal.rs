@@ -1,6 +1,6 @@
 //! Temporary writes that must be undone if the program is killed. Each one is recorded before it is sent.
 //!
-//! The file is in the layer above. The tasks use the trait [`Journal`].
+//! The file is handled by the layer above. The tasks use the trait [`Journal`].
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -42,7 +42,7 @@ pub trait Journal {
     /// The record cannot be written.
     fn record(&mut self, write: &TemporaryWrite) -> Result<(), JournalError>;
 
-    /// The write is undone.
+    /// Removes the record of a write that was undone.
     fn remove(&mut self, write: &TemporaryWrite);
 }
 
@@ -63,11 +63,11 @@ impl Journal for NoJournal {
 pub enum Undone {
     /// The object has its old value again.
     Restored,
-    /// The object holds another value than the one written: another program changed it, or the device restarted.
+    /// The value differs from the written one: another program changed it, or the device restarted.
     ChangedSince,
     /// Another device has the node-ID now.
     OtherDevice,
-    /// The device did not answer, or rejected the write. It is tried again by the next run.
+    /// The device did not answer, or rejected the write. The next run tries again.
     NotRestored,
 }
 
@@ -79,14 +79,15 @@ impl Undone {
 }
 
 impl TemporaryWrite {
-    /// A write to this node.
+    /// The record of a write to this node.
     pub fn to(node: &Node, object: ObjectId, before: &[u8], written: &[u8]) -> TemporaryWrite {
         let Identity { vendor, product, revision, serial, .. } = node.identity;
         let identity = [vendor, product, revision, serial];
         TemporaryWrite { node: node.id, identity, object, before: before.to_vec(), written: written.to_vec() }
     }
 
-    /// Undoes the write of an earlier run: only on the same device, and only if the object still has the written value.
+    /// Undoes the write of an earlier run, but only on the same device, and only if the object still has the written
+    /// value.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.
@@ -104,7 +105,7 @@ impl TemporaryWrite {
             return Ok(Undone::NotRestored);
         };
         let found = answer.uploaded.map(|uploaded| uploaded.bytes).unwrap_or_default();
-        // A device that indicates no size sends four bytes for every type.
+        // A device that does not indicate the size sends four bytes for every type.
         if !found.starts_with(&self.written) {
             return Ok(Undone::ChangedSince);
         }

@@ -1,7 +1,7 @@
 //! Records measurements: TPDOs as the nodes send them, TPDOs on SYNC or on remote request, or values polled by SDO.
 //!
-//! Samples and events go to an [`Observer`]; nothing is printed or written here. At its end, also after a failure, the
-//! recording returns the nodes that it started to their previous NMT states.
+//! Samples and events go to an [`Observer`]; nothing is printed or written here. At its end, even after a failure, the
+//! recording restores the previous NMT states of the nodes it started.
 
 mod changes;
 mod checks;
@@ -52,11 +52,11 @@ pub struct LogOptions {
     pub nodes: Vec<NodeId>,
     /// The signals; none means all.
     pub wanted: Vec<Wanted>,
-    /// Where the values come from.
+    /// The source of the values.
     pub mode: Mode,
-    /// End after this time.
+    /// Ends after this time.
     pub duration: Option<Duration>,
-    /// End after this many values.
+    /// Ends after this many values.
     pub count: Option<u64>,
     /// Whether nodes may be started.
     pub nmt: bool,
@@ -66,7 +66,7 @@ pub struct LogOptions {
     pub overrides: Overrides,
 }
 
-/// Where the values come from.
+/// The source of the values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// TPDOs as the nodes send them.
@@ -94,8 +94,8 @@ pub enum LogEvent {
     Restarted(NodeId),
     /// The setup of a node was read again, and has these changes. Its next frames are decoded with the new setup.
     ReadAgain(NodeId, Vec<Change>),
-    /// The setup of a node could not be read again. The program repeats the attempt. Until it succeeds, the node's frames
-    /// make no rows.
+    /// The setup of a node could not be read again. The program repeats the attempt. Until it succeeds, frames of the
+    /// node are ignored.
     Unreadable(NodeId, Box<Failure>),
     /// The heartbeat of a node stopped this long ago.
     HeartbeatLost(NodeId, Duration),
@@ -109,7 +109,7 @@ pub enum LogEvent {
     Silent(NodeId, Duration),
     /// The node sends samples again.
     Back(NodeId),
-    /// A TPDO of the node has another length than its mapping: mapped and received length in bytes. It makes no row.
+    /// The length of a TPDO differs from its mapping: mapped and received length in bytes. The TPDO is ignored.
     WrongLength(NodeId, usize, usize),
     /// A TPDO of the node is always longer than its mapping: mapped and received length in bytes. The mapped bytes are used.
     LongerTpdo(NodeId, usize, usize),
@@ -127,7 +127,7 @@ pub enum LogEvent {
     Link(bool),
 }
 
-/// Takes samples and events. `Break` ends the recording.
+/// Receives samples and events. `Break` ends the recording.
 pub trait Observer {
     /// Nodes whose setup could not be read, before [`Observer::begin`]. The other nodes are recorded. A passive recording
     /// does not call it.
@@ -141,8 +141,8 @@ pub trait Observer {
         Ok(())
     }
 
-    /// The sources to be recorded, in the order of their numbers, before anything is changed. More may follow later. A
-    /// passive recording does not call it.
+    /// The sources to be recorded, in the order of their numbers, before anything is changed. More sources may follow
+    /// later. A passive recording does not call it.
     ///
     /// # Errors
     /// The recording must not start.
@@ -155,7 +155,7 @@ pub trait Observer {
         ControlFlow::Continue(())
     }
 
-    /// Samples that were requested in this cycle, which may be an earlier one.
+    /// Samples that were requested in this cycle. It may be an earlier one than the present cycle.
     fn polled(&mut self, _cycle: u64, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
         self.samples(samples, sources)
     }
@@ -184,7 +184,7 @@ pub struct RecordingReport {
     pub statistics: Vec<(Source, Statistics)>,
     /// Nodes whose setup could not be read. They were not recorded.
     pub failed: Vec<Failure>,
-    /// Nodes with a TPDO that two devices send. Their TPDOs made no rows after that was found.
+    /// Nodes with a TPDO that two devices send. From then on, these TPDOs were ignored.
     pub two_senders: Vec<Failure>,
     /// Nodes that sent no samples, or stopped before the end.
     pub lost: Vec<NodeId>,
@@ -208,7 +208,7 @@ pub struct RecordingReport {
     pub timestamps: TimestampSource,
     /// Further observations.
     pub remarks: Vec<Remark>,
-    /// Whether the user ended it.
+    /// Whether the user ended the recording.
     pub interrupted: bool,
 }
 
@@ -307,7 +307,8 @@ fn survey(
     Ok((nodes, failed))
 }
 
-/// If the answers of a node arrive twice, compares its mapped values: two devices of one type may differ only in these.
+/// If the answers of a node arrive twice, compares its mapped values, because two devices of one type may differ only
+/// in these values.
 pub(super) fn compare_values(master: &mut Master<'_>, node: &Node) -> Result<Result<(), SdoError>, Error> {
     if !master.second_answers().iter().any(|&(twice, _)| twice == node.id) {
         return Ok(Ok(()));
@@ -315,7 +316,7 @@ pub(super) fn compare_values(master: &mut Master<'_>, node: &Node) -> Result<Res
     let entries = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).flat_map(|tpdo| &tpdo.mapping);
     let requests: Vec<Request> = entries.map(|entry| Request::read(node.id, entry.object)).collect();
     for result in master.transfer(requests, &mut |_| {})? {
-        // A value that cannot be read shows nothing.
+        // A value that cannot be read is no evidence.
         if let Err(error @ SdoError { failure: SdoFailure::TwoDevices(_), .. }) = result {
             return Ok(Err(error));
         }

@@ -1,4 +1,5 @@
-//! The objects that set the zero of a channel: signature, offset, measuring range. From the description or CiA 404.
+//! The objects that set the zero of a channel: signature, offset, measuring range. They are from the description or CiA
+//! 404.
 
 use super::ZeroTarget;
 use super::failure::AutozeroFailure;
@@ -38,14 +39,14 @@ pub(super) struct Offset {
     pub(super) data_type: DataType,
     /// The value of the object.
     pub(super) value: Value,
-    /// In the present unit.
+    /// The number in the present unit.
     pub(super) number: Number,
 }
 
-/// Finds the channel of a number, or the only one there is.
+/// Finds the channel with a number, or the only channel.
 ///
 /// # Errors
-/// The device has no autozero, or none of this channel; it has several channels and none was chosen; no answer.
+/// The device has no autozero, or not for this channel; several channels exist and none was chosen; no answer.
 pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
     let fail = |cause| Failure::at(device.id, cause);
     let description = device.model.as_ref().map(|model| &model.description);
@@ -81,7 +82,7 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
 /// of the signal.
 ///
 /// # Errors
-/// No channel has a tare, or not this one; several have one and none was chosen; no answer.
+/// No channel, or not this one, has a tare; several have a tare and none was chosen; no answer.
 pub(super) fn tare(master: &mut Master<'_>, device: &mut Node, number: Option<u8>) -> Result<Channel, Failure> {
     let fail = |cause| Failure::at(device.id, cause);
     let layout = device.layout();
@@ -139,7 +140,7 @@ fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
             let cause = AutozeroFailure::NoObject { channel: signal.channel, object, code };
             return Err(Failure::at(node, cause).of_object(object));
         }
-        // Write-only, as CiA 404 requires.
+        // The object is write-only, as CiA 404 requires.
         Ok(_) | Err(SdoError { failure: SdoFailure::Refused(_), .. }) => {}
         Err(error) => return Err(error.into()),
     }
@@ -173,7 +174,7 @@ fn data_type(device: &Node, object: ObjectId, otherwise: DataType) -> DataType {
     described.map_or(otherwise, |entry| entry.data_type)
 }
 
-/// The type that CiA 404 gives the objects of a family: 6xxxh REAL32, 7xxxh, 8xxxh and 9xxxh integers.
+/// The type of a family of CiA 404: REAL32 for 6xxxh; integers for 7xxxh, 8xxxh and 9xxxh.
 fn of_family(object: ObjectId) -> DataType {
     match object.index & 0xf000 {
         0x7000 => DataType::Integer(2),

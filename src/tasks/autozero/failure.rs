@@ -11,14 +11,14 @@ use crate::measure::sample::Number;
 use crate::tasks::Kind;
 use crate::tasks::store::Group;
 
-/// A value with its unit and the decimals that are significant.
+/// A value with its unit and its decimal digits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
     /// The value.
     pub value: f64,
     /// Its unit; `None` if the device reports none.
     pub unit: Option<Unit>,
-    /// The significant decimals.
+    /// The number of decimal digits to show.
     pub decimals: usize,
 }
 
@@ -30,29 +30,29 @@ pub enum AutozeroFailure {
         /// The title of its description.
         title: String,
     },
-    /// The device has no autozero of this channel.
+    /// The device has no autozero for this channel.
     NoSuchChannel {
         /// The title of its description.
         title: String,
         /// The channel.
         channel: u8,
-        /// The channels that have one.
+        /// The channels that support it.
         available: Vec<u8>,
     },
     /// The device has several channels, and none was chosen.
     WhichChannel {
-        /// What is set to zero.
+        /// The value to set to zero.
         target: ZeroTarget,
-        /// The channels that have one; empty if they are unknown.
+        /// The channels that support it; empty if they are unknown.
         available: Vec<u8>,
     },
-    /// Neither description nor EDS states a tare.
+    /// Neither description nor EDS contains a tare.
     NoTare,
-    /// Neither description nor EDS states a tare of this channel.
+    /// Neither description nor EDS contains a tare for this channel.
     NoTareOfChannel {
         /// The channel.
         channel: u8,
-        /// The channels that have one.
+        /// The channels that support it.
         available: Vec<u8>,
     },
     /// The device has no tare zero that can be read and written.
@@ -85,9 +85,9 @@ pub enum AutozeroFailure {
     },
     /// The device restarted before the signature was sent.
     RestartedBefore,
-    /// A safety check stopped it.
+    /// A safety check failed.
     Unsafe {
-        /// What is set to zero.
+        /// The value to set to zero.
         target: ZeroTarget,
         /// The reason.
         objection: Objection,
@@ -96,7 +96,7 @@ pub enum AutozeroFailure {
     },
     /// The device accepted the signature and restarted.
     RestartedAfter,
-    /// The device accepted the signature, and the reading is not zero.
+    /// The device accepted the signature, but the reading is not zero.
     NotZero {
         /// The signal.
         signal: String,
@@ -111,12 +111,12 @@ pub enum AutozeroFailure {
     OtherOffsetStored,
 }
 
-/// How the offset compares to the offset before.
+/// The change of the offset by the signature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OffsetChange {
-    /// It changed from the first to the second number.
+    /// The offset changed from the first to the second number.
     Changed(Number, Number),
-    /// It is as before.
+    /// The offset did not change.
     Unchanged,
     /// The device has no offset that can be read.
     Unreadable,
@@ -155,30 +155,30 @@ impl AutozeroFailure {
 /// The state after a failed autozero.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AutozeroEffect {
-    /// The signature was sent once. It is unknown whether the device acted on it.
+    /// The signature was sent once. It is unknown whether the device executed it.
     SignatureSent {
         /// The object.
         object: ObjectId,
     },
-    /// The offset before, and where to see it now.
+    /// The previous offset, and where to read the present one.
     OffsetBefore {
         /// The object and the number; `None` if no offset can be read.
         offset: Option<(ObjectId, Number)>,
         /// The signal.
         signal: String,
     },
-    /// The offset is as before; if no offset can be read, the reading is not zero.
+    /// The offset did not change; if no offset can be read, the reading is not zero.
     NoChangeSeen {
         /// The object of the offset; `None` if no offset can be read.
         offset: Option<ObjectId>,
         /// The signal.
         signal: String,
     },
-    /// The zero was moved by this much, if that is known.
+    /// The shift of the zero, if known.
     Moved(Option<Quantity>),
     /// The zero was stored.
     Stored,
-    /// How to undo it.
+    /// How to undo the change.
     Undo(Undo),
 }
 
@@ -196,9 +196,9 @@ pub enum Undo {
         /// The group to be stored afterwards, if the zero is stored.
         store: Option<Group>,
     },
-    /// By restoring the factory defaults: no offset can be written, and the zero is stored.
+    /// By restoring the factory defaults, because no offset can be written and the zero is stored.
     Restore,
-    /// By a reset: the zero is not stored.
+    /// By a reset, because the zero is not stored.
     Reset,
 }
 
@@ -226,7 +226,7 @@ pub enum AutozeroFact {
     NothingChanged,
     /// The device did not acknowledge the signature, but this proves that it executed the signature.
     ProvedBy(Proof),
-    /// How to undo it.
+    /// How to undo the change.
     Undo(Undo),
     /// The zero is not stored.
     NotStored {

@@ -5,11 +5,11 @@ use super::samples::Samples;
 use crate::device::unit::Unit;
 use crate::measure::sample::Status;
 
-/// A reading within this part of the measuring range is accepted as zero.
+/// The limit for the reading, as a part of the measuring range.
 const READING: f64 = 0.01;
-/// The readings may vary by this part of the same.
+/// The limit for the variation, as a part of the limit for the reading.
 const SPREAD: f64 = 0.5;
-/// The total offset is limited to this part of the measuring range.
+/// The limit for the total offset, as a part of the measuring range.
 const SUM: f64 = 0.05;
 
 /// The largest reading that is accepted as zero.
@@ -18,7 +18,7 @@ pub enum Limit {
     /// One hundredth of the measuring range.
     #[default]
     Default,
-    /// This many percent of the measuring range.
+    /// A percentage of the measuring range.
     Percent(f64),
     /// A value in this unit, or in the present one.
     Value(f64, Option<Unit>),
@@ -45,7 +45,7 @@ impl Limits {
             Limit::Value(value, None) => (value, None),
             Limit::Value(value, Some(from)) => {
                 let to = unit?;
-                // A difference, not a point on the scale.
+                // The limit is a difference, not a point on the scale.
                 (from.convert(value, to)? - from.convert(0.0, to)?, None)
             }
         };
@@ -56,7 +56,7 @@ impl Limits {
     }
 }
 
-/// Why a safety check stops an autozero.
+/// Why a safety check failed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Objection {
     /// The sensor measures absolute pressure.
@@ -90,7 +90,7 @@ pub enum Objection {
     Unsteady {
         /// The signal.
         signal: String,
-        /// From the least to the greatest reading.
+        /// The difference of the greatest and the least reading.
         spread: Quantity,
         /// The limit.
         limit: Quantity,
@@ -109,13 +109,13 @@ pub enum Objection {
 }
 
 impl Objection {
-    /// Whether it is a reason not to tare: the process value may have any distance from zero.
+    /// Whether the objection also applies to a tare. For a tare, the process value may be far from zero.
     pub(super) fn concerns_tare(&self) -> bool {
         matches!(self, Objection::Invalid { .. } | Objection::Unsteady { .. })
     }
 }
 
-/// What the safety checks need.
+/// The input of the safety checks.
 pub(super) struct Measured<'a> {
     pub(super) signal: &'a str,
     pub(super) unit: Option<Unit>,
@@ -131,7 +131,7 @@ impl Measured<'_> {
         Quantity { value, unit: self.unit, decimals: self.decimals }
     }
 
-    /// All reasons not to set the zero, the most serious first.
+    /// All failed checks, the most serious first.
     pub(super) fn objections(&self, limits: Option<&Limits>) -> Vec<Objection> {
         let mut found = Vec::new();
         let signal = || self.signal.to_owned();

@@ -23,7 +23,7 @@ pub(super) struct Samples {
     statistics: Statistics,
     /// The status of the first invalid reading.
     pub(super) bad: Option<Status>,
-    /// Whether the node restarted meanwhile.
+    /// Whether the node restarted during the readings.
     pub(super) booted: bool,
 }
 
@@ -33,7 +33,7 @@ impl Samples {
         self.statistics.mean().filter(|_| self.bad.is_none() && self.statistics.invalid() == 0)
     }
 
-    /// From the least to the greatest reading.
+    /// The difference of the greatest and the least reading.
     pub(super) fn spread(&self) -> f64 {
         self.statistics.max().zip(self.statistics.min()).map_or(0.0, |(max, min)| max - min)
     }
@@ -60,7 +60,7 @@ impl Samples {
         let status = answers.next();
         let is_reported = target.reports_overload(status.as_ref());
         let sample = sample(target, value, status)?;
-        // An overload that comes only from the span is ignored: a large zero error shows the same.
+        // An overload computed only from the measuring range is ignored, because a large zero error looks the same.
         let is_from_span = target.status.is_none() && sample.value.is_some() && !is_reported;
         let from_span = |status: Status| is_from_span && status.is_overload();
         let bad = sample.status.filter(|&status| status != Status::Ok && !from_span(status));
@@ -70,7 +70,7 @@ impl Samples {
     }
 }
 
-/// Reads a signal `count` times. A pause before each reading makes sure that it is new.
+/// Reads a signal `count` times. A pause before each reading makes sure that the value is new.
 ///
 /// # Errors
 /// An SDO abort, no answer, a bus error, Ctrl-C.

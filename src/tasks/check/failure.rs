@@ -15,7 +15,7 @@ pub enum CheckFailure {
     },
     /// No source states the type of an object that an expression needs.
     UnknownType {
-        /// The object as the user named it.
+        /// The object as entered by the user.
         signal: String,
     },
     /// There is no data for at least one expression.

@@ -34,11 +34,11 @@ use std::time::Duration;
 pub struct Options {
     /// The sections that are used.
     pub sections: Sections,
-    /// Whether settings that are not in the file are set to their factory defaults.
+    /// Whether settings missing in the file are set to their factory defaults.
     pub exact: bool,
     /// Whether the device stores the settings.
     pub store: bool,
-    /// Whether the device is reset then, and read again.
+    /// Whether the device is then reset and read again.
     pub reset: bool,
     /// The words that the user typed after the node: the file and the options.
     pub arguments: String,
@@ -51,7 +51,7 @@ pub struct Row {
     pub key: String,
     /// The value before.
     pub before: Option<Item>,
-    /// The value now; after a failure the value that was written.
+    /// The present value; after a failure, the written value.
     pub after: Option<Item>,
 }
 
@@ -79,14 +79,14 @@ pub trait Journal {
     /// Called before the first write.
     ///
     /// # Errors
-    /// The journal cannot be written; then nothing is changed.
+    /// The journal cannot be written. Nothing is changed then.
     fn begin(&mut self, before: &Snapshot) -> Result<(), Failure>;
 
     /// Called after the last value was read back.
     fn finish(&mut self);
 }
 
-/// The settings of a file that a device does not have yet, and those that are ignored.
+/// The settings of a file that differ from those of the device, and notes about ignored settings.
 pub fn targets(file: &FileSettings, before: &Snapshot, options: &Options) -> (Vec<Wanted>, Vec<Note>) {
     let id = before.node.id;
     let (mut used, ignored): (Vec<Wanted>, Vec<Wanted>) =
@@ -124,8 +124,9 @@ pub fn targets(file: &FileSettings, before: &Snapshot, options: &Options) -> (Ve
 /// Applies the contents of a file to a device.
 ///
 /// # Errors
-/// A condition that is not met; a failed write, with the written and the missing settings; values that read
-/// differently afterwards.
+/// - A condition is not met.
+/// - A write failed (with the written and the missing settings).
+/// - A value differs when read back.
 pub fn apply(
     master: &mut Master<'_>,
     before: Snapshot,
@@ -183,7 +184,7 @@ struct Work<'m, 'bus> {
 }
 
 impl Work<'_, '_> {
-    /// The settings that the device does not have yet.
+    /// The settings that differ from those of the device.
     fn differing(&self) -> Vec<&Wanted> {
         let differs = |wanted: &&Wanted| self.now.content(&wanted.setting).as_ref() != Some(&wanted.content);
         self.targets.iter().filter(differs).collect()
@@ -232,7 +233,7 @@ impl Work<'_, '_> {
         let stages: BTreeSet<Stage> = self.targets.iter().map(|wanted| wanted.setting.stage).collect();
         let mut is_stale = false;
         for stage in stages.into_iter().filter(|stage| *stage != Stage::Address) {
-            // The device may have rescaled everything.
+            // The device may have converted other settings.
             if is_stale && stage > Stage::Digits {
                 self.refresh()?;
                 is_stale = false;
@@ -273,7 +274,7 @@ impl Work<'_, '_> {
         let differing: Vec<Wanted> = self.differing().into_iter().cloned().collect();
         let own = differing.iter().filter(|wanted| wanted.setting.stage == Stage::Tpdo(number));
         own.for_each(|wanted| self.record(wanted));
-        // The next TPDO may use an identifier that is free now.
+        // The next TPDO may use an identifier that has just become free.
         self.now.set_tpdo(changed.wanted);
         Ok(true)
     }
@@ -294,7 +295,7 @@ impl Work<'_, '_> {
         Ok(wrote)
     }
 
-    /// Writes an object and reads it back. If the device rejects it because of its state, the node is set to
+    /// Writes an object and reads it back. If the device rejects the write because of its NMT state, the node is set to
     /// PRE-OPERATIONAL once.
     fn write(&mut self, object: ObjectId, bytes: &[u8], data_type: DataType) -> Result<(), Failure> {
         let node = &self.now.node;
@@ -359,7 +360,7 @@ impl Work<'_, '_> {
         Ok(())
     }
 
-    /// Sets node-ID and bit rate, and brings the settings in line with the new node-ID.
+    /// Sets node-ID and bit rate, and updates the settings that depend on the node-ID.
     fn assign(&mut self, id: Option<NodeId>, rate: Option<u32>) -> Result<(), Failure> {
         let own = self.now.node.id;
         let job = Job {
@@ -399,7 +400,7 @@ impl Work<'_, '_> {
         if self.options.store && self.written.len() > count { self.store(false) } else { Ok(()) }
     }
 
-    /// All changes, including those that the device made by itself with a new unit.
+    /// All changes, including conversions by the device after a change of the unit.
     fn rows(&self) -> Vec<Row> {
         let row = |setting: &super::setting::Setting| {
             let old = self.before.settings.iter().find(|old| old.key == setting.key)?;

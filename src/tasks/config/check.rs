@@ -17,14 +17,14 @@ use crate::measure::sample::Number;
 use crate::node::Node;
 use crate::node::names::nearest;
 
-/// A setting with the value that a file gives it.
+/// A setting with its value in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wanted {
     /// The setting.
     pub setting: Setting,
     /// The value in the form of the device.
     pub content: Content,
-    /// The value in the file; its place is for messages.
+    /// The value in the file, with its place for messages.
     pub entry: Entry,
 }
 
@@ -39,7 +39,7 @@ pub struct FileSettings {
     pub scales: Scales,
 }
 
-/// Which sections of a file are used.
+/// The sections of a file that are used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sections {
     /// `[address]`.
@@ -63,8 +63,8 @@ impl Sections {
 const CONDITIONS: [&str; 5] =
     ["device.kind", "device.vendor", "device.product", "device.reference", "calibration.serial"];
 
-/// Checks a file against a node. `present` contains the present settings of the device. Without it, only the facts of
-/// its description are checked.
+/// Checks a file against a node. `present` contains the present settings of the device; if it is missing, only the
+/// facts of the description are checked.
 ///
 /// # Errors
 /// Every mistake, in the order of the places.
@@ -153,7 +153,7 @@ impl Check<'_> {
         self.mistakes.push(Mistake { place, key: entry.key.clone(), problem });
     }
 
-    /// Sets the units and digits to those after the change.
+    /// Updates the units and digits to those after the change.
     fn update_scales(&mut self, document: &Document) {
         let is_offline = self.present.is_none();
         for (scale, signal) in self.scales.signals.iter_mut().zip(&self.node.signals) {
@@ -197,7 +197,7 @@ impl Check<'_> {
         let read = setting.read(self.node, &self.scales, &entry.value);
         match read.and_then(|content| self.allowed(&setting, content, &entry.value)) {
             Ok(content) => content.map(|content| {
-                // An explicit COB-ID belongs to [address], wherever it is written.
+                // An explicit COB-ID always belongs to [address].
                 let key = path(&setting, &content);
                 Wanted { entry: Entry { key, ..entry.clone() }, content, setting }
             }),
@@ -227,7 +227,7 @@ impl Check<'_> {
         Problem::UnknownKey { device: title, nearest }
     }
 
-    /// Checks the limits that the description states.
+    /// Checks the limits in the description.
     fn allowed(&self, setting: &Setting, content: Option<Content>, item: &Item) -> Result<Option<Content>, Problem> {
         let Some(content) = content else { return Ok(None) };
         if !setting.is_writable {
@@ -309,7 +309,7 @@ impl Check<'_> {
         }
     }
 
-    /// Checks values that depend on each other, as they are after the change.
+    /// Checks values that depend on each other, with the values after the change.
     fn check_combinations(&mut self, file: &FileSettings) {
         let mut found = Vec::new();
         for wanted in &file.wanted {
@@ -338,7 +338,7 @@ impl Check<'_> {
         let other = self.find(&format!("{base}.{other}"))?;
         let is_in_file = file.wanted.iter().any(|wanted| wanted.setting.key == other.key);
         let rescales = self.present.is_some_and(|present| present.scales != self.scales);
-        // Reported once, at the lower end.
+        // The mistake is reported once, at the lower end.
         if is_in_file && !is_lower || !is_in_file && (rescales || self.present.is_none()) {
             return None;
         }
@@ -370,7 +370,7 @@ impl Check<'_> {
 
     /// Identifiers that two senders would share, and TPDOs without an identifier.
     fn same_id(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
-        // Without the device the node-ID is unknown, and with it the identifiers that follow from it.
+        // Without the device, the node-ID and the identifiers that depend on it are unknown.
         self.present?;
         let is_id = |setting: &&Setting| matches!(setting.form, Form::CobId(_));
         let is_on = |setting: &Setting| match setting.stage {
@@ -406,7 +406,7 @@ fn object_of(node: &Node, key: &str) -> Option<ObjectId> {
     name.parse().ok().or_else(|| node.entry_by_name(name).map(|entry| entry.object))
 }
 
-/// Objects that a file names and that are no setting of the catalog, although the device may have them.
+/// Objects in the file that are not in the table of settings but that the device may have.
 pub(super) fn named_objects(document: &Document, node: &Node, settings: &[Setting]) -> Vec<Setting> {
     let mut extra: Vec<Setting> = Vec::new();
     for entry in &document.entries {
@@ -418,7 +418,7 @@ pub(super) fn named_objects(document: &Document, node: &Node, settings: &[Settin
     extra
 }
 
-/// An object that can be set like a setting: it can be read and written, and is no command and no PDO parameter.
+/// An object that can be used as a setting: readable, writable, and neither a command nor a PDO parameter.
 pub(super) fn named_object(node: &Node, known: &dictionary::Entry) -> Option<Setting> {
     let object = known.object;
     let is_plain = known.access.is_readable() && known.access.is_writable() && known.data_type != DataType::Domain;

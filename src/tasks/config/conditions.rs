@@ -8,10 +8,10 @@ use crate::device::config_file::{Entry, Item};
 use crate::device::unit::Unit;
 use crate::tasks::Failure;
 
-/// The share of a range by which two equal ranges may differ: devices round when their unit is changed.
+/// The relative difference up to which two ranges are equal, because devices round after a change of the unit.
 const RANGE_TOLERANCE: f64 = 0.001;
 
-/// Checks the conditions of a file. The serial number counts only if the calibration is used.
+/// Checks the conditions of a file. The serial number is checked only if the calibration is used.
 ///
 /// # Errors
 /// [`ConfigFailure::Condition`] with the first condition that the device does not meet.

@@ -1,4 +1,4 @@
-//! DCF files (CiA 306): the settings of one in the form of a file, and the settings of a device as the objects of one.
+//! Converts the objects of a DCF (CiA 306) to settings, and the settings of a device to objects of a DCF.
 
 use super::check::named_object;
 use super::dump::path;
@@ -19,14 +19,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 const U32: DataType = DataType::Unsigned(4);
 
-/// Objects of a DCF that are no setting of the catalog, although the device may have them.
+/// Objects of a DCF that are not in the table of settings but that the device may have.
 pub(super) fn named_objects(dcf: &Eds, node: &Node, settings: &[Setting]) -> Vec<Setting> {
     let is_new = |object: &&ObjectId| !settings.iter().any(|setting| setting.object == **object);
     let entries = dcf.parameter_values.keys().filter(is_new).filter_map(|object| dcf.dictionary.get(*object));
     let setting = |entry| {
         let found = named_object(node, entry)?;
         let data_type = node.known_type(found.object).unwrap_or(entry.data_type);
-        // The name in the DCF can be another object of the device.
+        // The name in the DCF may be that of another object of the device.
         Some(Setting { key: format!("object.{}", found.object), data_type, ..found })
     };
     entries.filter_map(setting).collect()
@@ -41,7 +41,7 @@ fn objects(setting: &Setting) -> Vec<ObjectId> {
 }
 
 impl Snapshot {
-    /// The settings of a DCF in the form of a file for this device, and what the device does not have.
+    /// The settings of a DCF as a settings file for this device, and notes about objects that the device lacks.
     pub fn document_of(&self, dcf: &Eds) -> (Document, Vec<Note>) {
         let future = self.with_values(dcf);
         let mut document = Document::default();
@@ -101,7 +101,7 @@ impl Snapshot {
         (document, missing.into_iter().chain(others).collect())
     }
 
-    /// What the device would hold with the values of a DCF.
+    /// The settings of the device with the values of a DCF.
     fn with_values(&self, dcf: &Eds) -> Snapshot {
         let id = self.node.id;
         let written_for = dcf.commissioning.as_ref().and_then(|commissioning| commissioning.node_id).unwrap_or(id);
@@ -150,8 +150,8 @@ impl Snapshot {
         future
     }
 
-    /// The objects of a DCF with the settings of the device. The calibration is not among them: a DCF tool would write it
-    /// to every device.
+    /// The objects of a DCF with the settings of the device. The calibration is omitted, because a DCF tool would write
+    /// it to every device.
     pub fn dcf_objects(&self) -> BTreeMap<ObjectId, (DataType, Scalar)> {
         let id = u32::from(self.node.id.get());
         let word = |word: u32, default: Option<u16>| match default {
@@ -200,7 +200,7 @@ impl Snapshot {
     }
 }
 
-/// A COB-ID that is the default of the node-ID for which a DCF was written is the default of this node-ID.
+/// If a COB-ID is the default for the node-ID of the DCF, returns the default for this node-ID.
 fn follow(word: u32, default: u16, id: NodeId, written_for: NodeId) -> u32 {
     let [default, id, other] = [u32::from(default), u32::from(id.get()), u32::from(written_for.get())];
     if default > id && word & 0x1fff_ffff == default - id + other { word & !0x1fff_ffff | default } else { word }

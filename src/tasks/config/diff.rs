@@ -11,7 +11,7 @@ use crate::device::config_file::{Document, Item};
 use crate::node::Node;
 use std::collections::BTreeMap;
 
-/// The settings that differ, and the differing keys in sections that are not compared.
+/// The differing settings, and the differing keys in ignored sections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Difference {
     /// The settings that differ.
@@ -50,7 +50,7 @@ pub fn of_devices(first: &Snapshot, second: &Snapshot, sections: Sections) -> Di
     compare(&items(first), &items(second), sections, &|_, first, second| first == second)
 }
 
-/// Compares two files. Values that mean the same on the device of the first file are equal.
+/// Compares two files. Different texts with the same meaning on the device of the first file are equal.
 pub fn of_files(first: &Document, second: &Document, node: Option<&Node>, sections: Sections) -> Difference {
     let items = |document: &Document| -> BTreeMap<String, Item> {
         document.entries.iter().map(|entry| (entry.key.clone(), entry.value.clone())).collect()

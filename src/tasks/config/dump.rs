@@ -17,9 +17,9 @@ pub struct Row {
     pub key: String,
     /// The value.
     pub value: Item,
-    /// Whether it is the factory default; `None` if that is unknown.
+    /// Whether the value is the factory default; `None` if the default is unknown.
     pub is_default: Option<bool>,
-    /// Whether the device cannot change it.
+    /// Whether the value cannot be changed.
     pub is_fixed: bool,
     /// The meaning of a number on this device.
     pub meaning: Option<String>,
@@ -36,14 +36,14 @@ pub struct Dump {
     pub dates: Vec<(&'static str, String)>,
     /// The settings, in the order of the sections.
     pub rows: Vec<Row>,
-    /// Objects that cannot be read, with the reason that the device gives.
+    /// Objects that cannot be read, with the reason.
     pub unreadable: Vec<String>,
 }
 
 /// The sections of a file, in their order.
 pub const SECTIONS: [&str; 7] = ["device", "address", "node", "signal", "tpdo", "object", "calibration"];
 
-/// The path under which a value is written: explicit COB-IDs are in `[address]`.
+/// The path of a value in a file; explicit COB-IDs are in `[address]`.
 pub(super) fn path(setting: &Setting, content: &Content) -> String {
     match (&setting.form, content) {
         (Form::CobId(default), Content::Number(id))
@@ -56,7 +56,8 @@ pub(super) fn path(setting: &Setting, content: &Content) -> String {
 }
 
 impl Snapshot {
-    /// The rows of a file with the settings. With `changed` only those that are not known to be factory defaults.
+    /// The rows of a file with the settings. With `changed`, settings that are known to be factory defaults are
+    /// omitted.
     pub fn dump(&self, changed: bool) -> Dump {
         let (node, identity, kind) = (self.node.id, &self.node.identity, self.kind());
         let row = |key: &str, value: Item| Row {

@@ -34,7 +34,7 @@ pub enum ConfigFailure {
         /// The place of the first value.
         place: Place,
     },
-    /// Settings have other values than were written.
+    /// Settings have other values than the written ones.
     NotKept {
         /// Key, value of the file, value of the device.
         settings: Vec<(String, Item, Option<Item>)>,
@@ -46,7 +46,7 @@ pub enum ConfigFailure {
         /// The other nodes.
         nodes: Vec<NodeId>,
     },
-    /// No device, or several, have the identity of a row of a table.
+    /// No device, or more than one, has the identity in a row of a table.
     NotOneDevice {
         /// The serial number.
         serial: u32,
@@ -62,12 +62,12 @@ pub enum ConfigFailure {
     NoJournal,
 }
 
-/// The changes that a failed application of settings left behind.
+/// The changes that remain after a failed application of settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConfigEffect {
     /// The settings that were written.
     pub written: Vec<Row>,
-    /// The keys that were not.
+    /// The keys of the settings that were not written.
     pub missing: Vec<String>,
     /// The words that the user typed after the node.
     pub arguments: String,
@@ -93,12 +93,12 @@ pub enum ConfigFact {
         /// The addresses and names.
         objects: Vec<String>,
     },
-    /// Objects of a DCF that are no settings: read-only, commands, received PDOs.
+    /// Objects of a DCF that are not settings: read-only, commands, received PDOs.
     NotSettings {
         /// The addresses and names.
         objects: Vec<String>,
     },
-    /// A new bit rate takes effect when the device starts again.
+    /// A new bit rate takes effect at the next start of the device.
     RateAfterRestart {
         /// The bit rate in bit/s.
         rate: u32,
@@ -131,7 +131,7 @@ impl ConfigFailure {
 }
 
 impl ConfigFact {
-    /// Whether the user should act on it.
+    /// Whether the user should react to the fact.
     pub fn is_warning(&self) -> bool {
         !matches!(self, ConfigFact::Ignored { .. } | ConfigFact::NotSettings { .. })
     }

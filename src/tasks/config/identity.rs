@@ -16,9 +16,9 @@ pub struct Range {
     pub start: Option<Number>,
     /// Its end, or its width.
     pub end: Number,
-    /// The unit of both.
+    /// The unit of both ends.
     pub unit: Option<Unit>,
-    /// How far a device may round both after a change of the unit.
+    /// The rounding of both ends after a change of the unit.
     pub step: f64,
 }
 
@@ -52,7 +52,7 @@ struct Places {
     unit: Option<ObjectId>,
 }
 
-/// The measuring ranges: of the description, of spans that cannot be changed, else of the scaling.
+/// The measuring ranges from the description, from spans that cannot be changed, or else from the scaling.
 fn ranges(node: &Node) -> Vec<Places> {
     let Some(model) = &node.model else { return Vec::new() };
     let description = &model.description;
@@ -64,7 +64,7 @@ fn ranges(node: &Node) -> Vec<Places> {
         let range = zero.and_then(|zero| zero.range.as_ref());
         let entry = description.signals.iter().find(|entry| entry.name == signal.name);
         let span = entry.and_then(|entry| entry.span_start.zip(entry.span_end));
-        // A span that can be changed is a setting.
+        // A span that can be changed is a setting, not a measuring range.
         let span = span.filter(|(_, end)| node.is_read_only(*end));
         let width = node.object_of(signal, "pressure-span").filter(|object| node.is_read_only(*object));
         let [first, last] = [0x121, 0x123].map(|low| has(node.in_family(signal, low)));

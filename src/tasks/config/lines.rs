@@ -1,4 +1,4 @@
-//! The writes of an application as single steps that a person can follow (`config apply --dry-run`).
+//! The writes of an application as a list of single steps (`config apply --dry-run`).
 
 use super::apply::{Options, targets};
 use super::check::{FileSettings, Wanted};

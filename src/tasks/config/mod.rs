@@ -1,7 +1,7 @@
-//! All settings of a device at once: dump them, compare them, apply a file.
+//! Dumps, compares and applies all settings of a device.
 //!
-//! One table ([`setting`]) has every setting with its key, object, form of values and stage. [`Snapshot`] reads them;
-//! a file is [`crate::device::config_file::Document`].
+//! One table ([`setting`]) has every setting with its key, object, form of values and stage. [`Snapshot`] reads the
+//! settings; [`crate::device::config_file::Document`] is a file.
 
 mod apply;
 mod check;
@@ -39,14 +39,14 @@ use crate::tasks::{Failure, Note};
 /// A file with settings.
 #[derive(Clone, Debug)]
 pub enum File {
-    /// As `config dump` writes it.
+    /// A file in the format of `config dump`.
     Settings(Document),
-    /// A DCF. What its values mean as settings depends on the device.
+    /// A DCF. The meaning of its values depends on the device.
     Dcf(Box<Eds>),
 }
 
 impl File {
-    /// The contents for one device, and what of them the device does not have.
+    /// The contents for one device, and notes about settings that the device lacks.
     pub fn document(&self, snapshot: &Snapshot) -> (Document, Vec<Note>) {
         match self {
             File::Settings(document) => (document.clone(), Vec::new()),
@@ -55,10 +55,10 @@ impl File {
     }
 }
 
-/// Reads all settings of a node, and the objects that a file names besides.
+/// Reads all settings of a node, and further objects in a file.
 ///
 /// # Errors
-/// A node that does not answer; bus errors and Ctrl-C.
+/// The node does not answer; bus errors and Ctrl-C.
 pub fn read(
     master: &mut Master<'_>,
     node: NodeId,

@@ -49,7 +49,7 @@ pub enum Problem {
         /// The text.
         text: String,
     },
-    /// The device counts in steps of so many microseconds.
+    /// The duration is not a multiple of the step of the device, in microseconds.
     DurationStep {
         /// The step.
         tick: u32,
@@ -73,7 +73,7 @@ pub enum Problem {
         /// The unit of the signal.
         to: Unit,
     },
-    /// An integer with these digits cannot hold the number.
+    /// The number has more decimal digits than the integer.
     TooFine {
         /// The decimal digits.
         digits: u8,
@@ -92,7 +92,7 @@ pub enum Problem {
         /// The values.
         values: Vec<String>,
     },
-    /// Not one of the words.
+    /// Not an allowed word.
     Word {
         /// The text.
         text: String,
@@ -135,7 +135,7 @@ pub enum Problem {
     },
     /// More entries than the device has.
     Entries {
-        /// The number of entries that it has.
+        /// The number of entries of the device.
         high: String,
     },
     /// An entry of a mapping is wrong.
@@ -144,7 +144,7 @@ pub enum Problem {
     NotMappable {
         /// The object.
         object: ObjectId,
-        /// The entry as the file writes it.
+        /// The entry as written in the file.
         text: String,
     },
     /// The table has no such column, or the cell is empty.

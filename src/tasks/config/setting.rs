@@ -18,15 +18,15 @@ use std::collections::BTreeSet;
 pub struct Setting {
     /// The path in files and reports: `tpdo.1.event-timer`.
     pub key: String,
-    /// The object that holds it.
+    /// The object that contains the value.
     pub object: ObjectId,
     /// The type of the object.
     pub data_type: DataType,
     /// How its values are written.
     pub form: Form,
-    /// When it is written.
+    /// The stage in which the setting is written.
     pub stage: Stage,
-    /// Whether it can be written.
+    /// Whether the object can be written.
     pub is_writable: bool,
 }
 
@@ -35,9 +35,9 @@ pub struct Setting {
 pub enum Form {
     /// As the type of the object.
     Plain,
-    /// An integer in hexadecimal digits.
+    /// A hexadecimal integer.
     Hex,
-    /// A duration; the object counts in steps of so many microseconds.
+    /// A duration; the step of the object is this many microseconds.
     Duration(u32),
     /// A unit: `"bar"`.
     Unit,
@@ -47,9 +47,9 @@ pub enum Form {
     Words(Vec<(u64, String)>),
     /// The transmission type of a TPDO. The number is the type for the event timer.
     Transmission(u8),
-    /// The identifier of a COB-ID, and the identifier that follows from the node-ID.
+    /// The identifier of a COB-ID, and its default for the node-ID.
     CobId(u16),
-    /// One bit of a COB-ID; `true` if it is this.
+    /// One bit of a COB-ID; the flag is the bit value that means `true`.
     Bit(u8, bool),
     /// The mapping of a TPDO.
     Signals(TpdoNumber),
@@ -59,7 +59,7 @@ pub enum Form {
     BitRate,
 }
 
-/// How a number in the unit of a signal is converted to another unit.
+/// The kind of conversion of a number if the unit of its signal changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
     /// A point on the scale.
@@ -272,7 +272,7 @@ impl Catalog<'_> {
         (first == Some(object.index & 0xf000)).then_some((signal, name, stage))
     }
 
-    /// Whether an object of CiA 404 is the same setting as one in another family.
+    /// Whether an object of CiA 404 is the same setting as an object of another family.
     fn is_in_other_family(&self, object: ObjectId) -> bool {
         let low = object.index & 0x0fff;
         let families = [0x6000, 0x7000, 0x8000, 0x9000];
@@ -320,7 +320,7 @@ impl Catalog<'_> {
         rows.into_iter().filter(|(_, object, ..)| self.node.may_have(*object)).map(setting).collect()
     }
 
-    /// The position of the setting's section, and within it.
+    /// The position of the section of a setting, and the position within the section.
     fn rank(&self, setting: &Setting) -> usize {
         let section = setting.key.split('.').next().unwrap_or_default();
         let sections = ["address", "node", "signal", "tpdo", "object", "calibration"];

@@ -26,15 +26,15 @@ pub struct Snapshot {
     pub tpdos: Vec<pdo::Settings>,
     pub(super) values: BTreeMap<ObjectId, Vec<u8>>,
     bit_rate: Option<u32>,
-    /// Objects that the device has, but does not allow to read.
+    /// Objects whose read is rejected by the device.
     pub unreadable: Vec<(ObjectId, AbortCode)>,
 }
 
 impl Snapshot {
-    /// Reads all settings of a node that was surveyed.
+    /// Reads all settings of a surveyed node.
     ///
     /// # Errors
-    /// A node that stops answering; bus errors and Ctrl-C.
+    /// The node stops answering; bus errors and Ctrl-C.
     pub fn read(master: &mut Master<'_>, node: Node, settings: Vec<Setting>) -> Result<Snapshot, Failure> {
         let is_single = |setting: &&Setting| setting.object.index != 0 && !matches!(setting.stage, Stage::Tpdo(_));
         let mut objects: Vec<(ObjectId, DataType)> =
@@ -113,7 +113,7 @@ impl Snapshot {
         self.values.get(&object).map(Vec::as_slice)
     }
 
-    /// The value of a setting as a file writes it.
+    /// The value of a setting in the form of a file.
     pub fn show(&self, setting: &Setting) -> Option<Item> {
         Some(setting.show(&self.node, &self.scales, &self.content(setting)?))
     }
@@ -123,7 +123,7 @@ impl Snapshot {
         Some(self.content(setting)? == self.default(setting)?)
     }
 
-    /// The factory default of a setting, if a description or EDS states it without doubt.
+    /// The factory default of a setting, if a description or EDS contains it without a doubt.
     pub fn default(&self, setting: &Setting) -> Option<Content> {
         let default = |object: ObjectId| {
             let is_doubtful = self.node.described(object).is_some_and(|entry| !entry.doubt.is_empty());
@@ -205,14 +205,14 @@ fn read_objects(master: &mut Master<'_>, node: &Node, objects: &[(ObjectId, Data
     Ok((values, unreadable))
 }
 
-/// The bit rate to which the device is set, if an object contains its code.
+/// The bit rate setting of the device, if an object contains its code.
 fn bit_rate(node: &Node, values: &BTreeMap<ObjectId, Vec<u8>>) -> Option<u32> {
     let model = node.model.as_ref()?;
     let code = *values.get(&model.dictionary.find("bit-rate")?.object)?.first()?;
     model.description.bit_rates.get(&code).copied()
 }
 
-/// Units and digits as they are now.
+/// Updates units and digits.
 pub(super) fn renew_signals(node: &mut Node, values: &BTreeMap<ObjectId, Vec<u8>>) {
     for signal in &mut node.signals {
         let bytes = |index: u16| values.get(&ObjectId::new(index, signal.channel));
@@ -223,7 +223,7 @@ pub(super) fn renew_signals(node: &mut Node, values: &BTreeMap<ObjectId, Vec<u8>
     }
 }
 
-/// TPDOs as they are now: checks of identifiers use them.
+/// Updates the TPDOs, because checks of identifiers use them.
 pub(super) fn renew_tpdos(node: &mut Node, tpdos: &[pdo::Settings]) {
     for tpdo in &mut node.tpdos {
         if let Some(now) = tpdos.iter().find(|now| now.number == tpdo.number) {

@@ -1,4 +1,4 @@
-//! Values of settings: as the device holds them, and as a file writes them.
+//! Converts values of settings between the form of the device and the form of a file.
 
 use super::problem::Problem;
 use super::setting::{Form, Scale, Setting};
@@ -12,7 +12,7 @@ use crate::node::{Node, names};
 use crate::tasks::pdo::{entry_of, text_of};
 use crate::tasks::settings::{QuantityError, encode_quantity};
 
-/// The value of a setting as the device holds it.
+/// The value of a setting in the form of the device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Content {
     /// The bytes of the object.
@@ -23,10 +23,10 @@ pub enum Content {
     Mapping(Vec<MappingEntry>),
 }
 
-/// The unit and the decimal digits of each signal, so far as they are known.
+/// The unit and the decimal digits of each signal, as far as known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scales {
-    /// In the order of the signals.
+    /// Units and digits in the order of the signals.
     pub signals: Vec<SignalScale>,
 }
 
@@ -58,7 +58,7 @@ impl Scales {
 }
 
 impl Setting {
-    /// A value as a file writes it.
+    /// A value in the form of a file.
     pub fn show(&self, node: &Node, scales: &Scales, content: &Content) -> Item {
         let number = match content {
             Content::Number(number) => u64::from(*number),
@@ -114,7 +114,7 @@ impl Setting {
             Value::Bool(bit) => Item::Flag(bit),
             Value::Unsigned(number) => Item::Integer(number.into()),
             Value::Integer(number) => Item::Integer(number.into()),
-            // The shortest text that reads back to the same REAL32.
+            // The shortest text that parses to the same REAL32.
             Value::Real32(number) => Item::Real(number.to_string().parse().unwrap_or(f64::from(number))),
             Value::Real64(number) => Item::Real(number),
             Value::Bytes(_) => hex(),
@@ -122,7 +122,7 @@ impl Setting {
         }
     }
 
-    /// A value of a file as the device holds it. `None` if that depends on a unit or on digits that are not known yet.
+    /// A value of a file in the form of the device. `None` if this depends on a unit or digits that are still unknown.
     ///
     /// # Errors
     /// The value has another form, does not fit, or its unit cannot be converted.
@@ -256,7 +256,7 @@ impl Setting {
     }
 }
 
-/// The unit as a file writes it: its symbol, or its code.
+/// The unit in the form of a file: its symbol, or its code.
 fn unit_text(unit: Unit) -> String {
     unit.to_string()
 }

@@ -14,10 +14,10 @@ pub enum DetectFailure {
         interface: String,
         /// The bit rates that were tried.
         detection: Detection,
-        /// Whether nodes were asked as well.
+        /// Whether requests were also sent.
         active: bool,
     },
-    /// The interface could not be set back to its previous state.
+    /// The interface could not be restored to its previous state.
     NotRestored {
         /// The interface.
         interface: String,

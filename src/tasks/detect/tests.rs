@@ -1,4 +1,4 @@
-//! On a simulated wire with a bit rate: at another bit rate, only errors are received.
+//! Tests on a simulated wire: at a wrong bit rate, only errors are received.
 
 use super::*;
 use crate::bus::{BitRateControl, Mono, Received, Stamp, TimestampSource, Wall};
@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 
 const EACH: Duration = Duration::from_millis(1500);
 
-/// An interface, and one device with a heartbeat of once a second.
+/// An interface, and one device with one heartbeat per second.
 struct Wire {
     now: Mono,
     /// The bit rate of the device.
@@ -23,7 +23,7 @@ struct Wire {
     third_node: bool,
     /// A bit rate that the interface cannot be set to.
     impossible: Option<u32>,
-    /// Whether it has a listen-only mode.
+    /// Whether the interface has a listen-only mode.
     listens: bool,
     /// The error if the interface cannot be set at all.
     refusal: Option<fn() -> BusError>,
@@ -137,7 +137,7 @@ impl Bus for Wire {
             return Ok(Event::Timeout);
         }
         self.now = next;
-        // A frame that no node acknowledges is an error for all.
+        // A frame without an acknowledgement is an error for all nodes.
         let normal = self.set.is_some_and(|(_, mode)| mode == Mode::Normal);
         if self.matches() && (self.third_node || normal) {
             return Ok(Event::Frame(Received { frame: "705#7F".parse().unwrap(), at: self.stamp() }));
@@ -231,7 +231,7 @@ fn missing_permission_changes_nothing() {
 
 #[test]
 fn interface_is_restored_after_ctrl_c_at_any_time() {
-    // Listening takes 13.5 s, asking takes the same time again.
+    // Listening takes 13.5 s, and the requests take another 13.5 s.
     for millis in (0..27_000).step_by(1900) {
         let mut wire = Wire { heartbeat: false, answers: false, ..Wire::at(83_333) };
         wire.interrupt = Some(Mono::at(Duration::from_millis(millis)));

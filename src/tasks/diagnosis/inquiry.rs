@@ -1,4 +1,4 @@
-//! Asks a silent node whether it answers, and reads the objects that keep its TPDOs from being sent.
+//! Checks whether a silent node answers, and reads the objects that can prevent its TPDOs.
 
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
@@ -14,13 +14,13 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// All questions are answered or given up within this time: two attempts of an SDO request with a long time-out.
+/// The time limit for all reads: two attempts of an SDO request with a long time-out.
 const INQUIRY_LIMIT: Duration = Duration::from_secs(20);
 
 /// The answers of a node.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Findings {
-    /// Whether it answers SDO requests.
+    /// Whether the node answers SDO requests.
     pub answers: bool,
     /// Its NMT state, and the evidence for it.
     pub state: Option<(NmtState, Proof)>,
@@ -84,20 +84,20 @@ pub(super) fn triggers(node: &Node, value: ObjectId) -> Option<[ObjectId; 3]> {
     is_family.then(|| [3, 4, 5].map(|offset| ObjectId::new(value.index + offset, value.sub)))
 }
 
-/// The object that lets a device of CiA 401 send its analogue inputs (6423h).
+/// The object that enables a CiA 401 device to send its analogue inputs (6423h).
 pub(super) fn interrupt_enable(node: &Node, value: ObjectId) -> Option<ObjectId> {
     let is_input = matches!(value.index, 0x6400..=0x6404);
     (is_input && node.identity.profile() == Some(profiles::GENERIC_IO)).then_some(ObjectId::new(0x6423, 0))
 }
 
-/// Questions to silent nodes. Nothing waits for the answers.
+/// Reads objects of silent nodes, without waiting for the answers.
 pub struct Inquiry {
     open: BTreeMap<Ticket, (NodeId, ObjectId)>,
     findings: BTreeMap<NodeId, Findings>,
 }
 
 impl Inquiry {
-    /// Asks the nodes.
+    /// Starts the reads.
     pub fn begin(master: &mut Master<'_>, asked: &[(NodeId, Vec<ObjectId>)]) -> Inquiry {
         let mut open = BTreeMap::new();
         for (node, objects) in asked {
@@ -108,7 +108,7 @@ impl Inquiry {
         Inquiry { open, findings: BTreeMap::new() }
     }
 
-    /// Takes the end of a transfer. Returns the findings if it was the last one.
+    /// Handles the end of a transfer. Returns the findings after the last transfer.
     pub fn take(
         &mut self,
         ticket: Ticket,
@@ -134,13 +134,13 @@ impl Inquiry {
         self.open.is_empty().then(|| std::mem::take(&mut self.findings))
     }
 
-    /// Whether a transfer is one of these.
+    /// Whether a transfer belongs to this inquiry.
     pub fn has(&self, ticket: Ticket) -> bool {
         self.open.contains_key(&ticket)
     }
 
-    /// Asks the nodes and waits for their answers. The NMT state of nodes in `guarded` that answer is found out as
-    /// `nmt state` does.
+    /// Reads the objects and waits for the answers. The NMT state of answering nodes in
+    /// `guarded` is determined as by `nmt state`.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.
