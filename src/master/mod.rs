@@ -169,8 +169,8 @@ impl<'bus> Master<'bus> {
         self.outgoing.push(frame, None);
     }
 
-    /// Queues a frame before all waiting frames, so that a SYNC does not wait for SDO requests. `false` if the previous
-    /// frame still waits; then the new frame is not queued.
+    /// Queues a frame before all waiting frames, so that a SYNC does not wait for SDO requests. Not queued (`false`) if
+    /// the previous frame still waits.
     pub fn send_first(&mut self, frame: Frame) -> bool {
         self.outgoing.push_first(frame)
     }
@@ -229,7 +229,7 @@ impl<'bus> Master<'bus> {
     /// Outer: the bus failed or the user interrupted. Inner: two devices answer.
     pub fn ensure_single(&mut self, node: NodeId) -> Result<Result<(), SdoError>, Error> {
         if self.sdo.needs_check(node) {
-            // A device without a serial number also answers. If the device is silent, the write reports it.
+            // A device without a serial number also answers. The write reports a silent device.
             self.transfer_one(Request::read(node, SERIAL_NUMBER).once())?.ok();
         }
         let operation = Operation::Write;
