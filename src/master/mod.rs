@@ -317,8 +317,7 @@ impl<'bus> Master<'bus> {
     /// Returns the next event that was received by the moment `stop`, without waiting. Returns
     /// [`Happening::Deadline`] if there is none.
     ///
-    /// Frames that are already received are accepted up to one second (`DRAIN_LIMIT`) after `stop`, because receive
-    /// times are inaccurate on a busy machine.
+    /// Frames are accepted up to `DRAIN_LIMIT` after `stop`: receive times are inaccurate on a busy machine.
     ///
     /// # Errors
     /// The bus failed.
@@ -395,8 +394,8 @@ impl<'bus> Master<'bus> {
         Ok(retry_at)
     }
 
-    /// Carries out transfers in parallel. The results have the order of the requests. Frames that do not belong to
-    /// these transfers go to `watch`. If a node does not answer a request, its other requests end as cancelled.
+    /// Carries out transfers in parallel. The results have the order of the requests. Other frames go to `watch`. After
+    /// a missing answer, further requests to this node are cancelled.
     ///
     /// # Errors
     /// The bus failed or the user interrupted. Failures of one device are in its result.

@@ -341,7 +341,7 @@ fn record_passively(
     finish(recording, result)
 }
 
-/// Makes the report. If at least one value was recorded, Ctrl-C is not a failure.
+/// Creates the report. If at least one value was recorded, Ctrl-C is not a failure.
 fn finish(mut recording: Recording<'_>, result: Result<(), Error>) -> Result<RecordingReport, Failure> {
     match result {
         Ok(()) => {}
@@ -351,7 +351,7 @@ fn finish(mut recording: Recording<'_>, result: Result<(), Error>) -> Result<Rec
     Ok(recording.report())
 }
 
-/// `period` times `n`, to the nanosecond. Saturates.
+/// `period` times `n`, exact to the nanosecond. Saturates.
 fn nth(period: Duration, n: u64) -> Duration {
     let nanoseconds = period.as_nanos().saturating_mul(u128::from(n));
     Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))

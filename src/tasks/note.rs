@@ -1,6 +1,6 @@
-//! Reports of a task besides its result: effects of a failure, notes and warnings.
+//! Further reports of a task: effects of a failure, notes and warnings.
 //!
-//! These types contain no text for people. [`crate::output::notes`] turns them into text.
+//! These types contain no text. [`crate::output::notes`] converts them to text.
 
 use super::autozero::{AutozeroEffect, AutozeroFact};
 use super::config::{ConfigEffect, ConfigFact};
@@ -17,12 +17,12 @@ use crate::measure::layout::NarrowValue;
 use crate::measure::sample::Number;
 use crate::node::Node;
 
-/// A change before a failure, or the state that a failed task left behind.
+/// A change before a failure, or the state after a failed task.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// The task had changed nothing.
+    /// The task changed nothing.
     NothingChanged,
-    /// An interface could not be set back to its previous state.
+    /// An interface could not be restored to its previous state.
     InterfaceNotRestored {
         /// Its name.
         interface: String,
@@ -31,7 +31,7 @@ pub enum Effect {
         /// The reason.
         reason: String,
     },
-    /// The node was operational and may not be operational any more.
+    /// The node was operational, but may not be operational now.
     WasOperational,
     /// The rejected number breaks a rule of the device.
     Rule(Box<Rule>),
@@ -39,7 +39,7 @@ pub enum Effect {
     Autozero(AutozeroEffect),
     /// A change of node-ID or bit rate failed.
     Lss(Box<LssEffect>),
-    /// Settings were applied in part.
+    /// Settings were applied partly.
     Config(Box<ConfigEffect>),
     /// A change of a TPDO failed.
     Pdo(PdoEffect),
@@ -51,19 +51,19 @@ pub enum Effect {
     Store(StoreEffect),
 }
 
-/// A rule of a description that a number for an object breaks.
+/// A rule of a description that a number violates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
     /// The object.
     pub object: ObjectId,
-    /// What the description states about it.
+    /// The entry of the object in the description.
     pub entry: ObjectEntry,
-    /// Whether the number is not among the allowed ones. If it is, other objects must be 0 first.
+    /// Whether the number is not allowed. Otherwise, other objects must be 0 first.
     pub is_out_of_range: bool,
 }
 
 impl Rule {
-    /// The rule that these bytes break, if the description of the node has one.
+    /// The rule that these bytes violate, if the description of the node has one.
     pub fn broken(node: &Node, object: ObjectId, data: &[u8]) -> Option<Rule> {
         let entry = node.described(object)?;
         let is_number = matches!(entry.data_type, DataType::Unsigned(_) | DataType::Integer(_) | DataType::Real32);
@@ -78,7 +78,7 @@ impl Rule {
 /// The NMT state after a change, if it is not the previous state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StateEffect {
-    /// The previous state is unknown: the node stays in PRE-OPERATIONAL.
+    /// The previous state is unknown, so the node stays in PRE-OPERATIONAL.
     Unknown,
     /// The node did not return to its previous state.
     Differs {
@@ -96,23 +96,23 @@ pub enum StateEffect {
     NotRestored,
 }
 
-/// Something to report that is not the result.
+/// A note that is not part of the result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Note {
-    /// The node that it concerns.
+    /// The node of the note.
     pub node: Option<NodeId>,
     /// The fact.
     pub fact: Fact,
 }
 
-/// A fact about a success that is not its result.
+/// A fact about a successful task.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fact {
-    /// The node keeps the new values only until it loses power or is reset, unless they are stored.
+    /// The new values are lost at power off or reset, unless they are stored.
     KeptUntilPowerOff,
-    /// The node was operational before a reset, was started again, and is operational.
+    /// The node was operational before a reset, and was set to OPERATIONAL again.
     OperationalAgain,
-    /// The node was started, its previous state is unknown, and it stays operational.
+    /// The node was started and stays operational, because its previous state is unknown.
     LeftOperational,
     /// The device accepted a number that its description does not allow.
     Rule(Box<Rule>),
@@ -132,12 +132,12 @@ pub enum Fact {
     State(StateEffect),
     /// Settings were stored or restored.
     Store(StoreFact),
-    /// The state of the node before a reset is unknown; it is in the state in which it boots.
+    /// The state of the node before a reset is unknown. The node is in its state after boot-up.
     StateAsBooted,
 }
 
 impl Fact {
-    /// Whether the user should act on it: printed as a warning.
+    /// Whether the fact is printed as a warning.
     pub fn is_warning(&self) -> bool {
         match self {
             Fact::Lss(fact) => fact.event.is_warning(),
@@ -172,7 +172,7 @@ impl Note {
         Note { node: Some(node), fact: fact.into() }
     }
 
-    /// A note about no single node.
+    /// A note that does not belong to a single node.
     pub fn general(fact: impl Into<Fact>) -> Note {
         Note { node: None, fact: fact.into() }
     }

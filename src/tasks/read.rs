@@ -26,12 +26,12 @@ pub struct Target {
     pub unit: Option<Unit>,
     /// The object.
     pub object: ObjectId,
-    /// The status object (6150h), which is read as well.
+    /// The status object (6150h), which is also read.
     pub status: Option<ObjectId>,
     /// The type of the status.
     pub status_type: DataType,
-    /// The bits of the error register (1001h) that mean an overload, if the signal has no status object. The register is
-    /// read as well.
+    /// The bits of the error register (1001h) that mean an overload, if the signal has no status object. The register
+    /// is also read.
     pub overload_register: Option<u8>,
     /// How the bytes become a sample.
     pub reading: Reading,
@@ -158,7 +158,7 @@ pub fn sample(
         failure: SdoFailure::NotANumber,
     };
     let Some(data_type) = target.reading.data_type() else {
-        // Bytes without a known type stay bytes.
+        // Bytes of unknown type stay bytes.
         let bytes = answer.uploaded.as_ref().map(|uploaded| uploaded.bytes.as_slice()).unwrap_or_default();
         let sample = target.reading.sample(answer.at, bytes, None).filter(|_| bytes.len() <= 8);
         return sample.ok_or_else(not_a_number);
@@ -181,7 +181,7 @@ pub fn sample(
     Ok(sample)
 }
 
-/// The bytes of a value in the width of its type. The answer may have more or fewer.
+/// The bytes of a value in the width of its type. The answer may have more or fewer bytes.
 fn wire_bytes(value: &Value, data_type: DataType) -> Vec<u8> {
     let width = data_type.width().unwrap_or(8).min(8);
     match value {
@@ -221,8 +221,8 @@ pub fn read(
     Ok(planned.into_iter().map(|targets| readings(targets?, &mut answers)).collect())
 }
 
-/// The samples of one node from the answers to its [`requests`]. Takes all answers of the node, even if the first is an
-/// error: the answers of the next node follow.
+/// The samples of one node from the answers to its [`requests`]. Uses up all answers of the node, even after an error,
+/// because the answers of the next node follow.
 fn readings(
     targets: Vec<Target>,
     answers: &mut dyn Iterator<Item = Result<Answer, SdoError>>,

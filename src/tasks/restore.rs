@@ -1,4 +1,4 @@
-//! Restores the factory defaults of a device: "load" written to 1011h. Node-ID and bit rate stay.
+//! Restores the factory defaults of a device: "load" written to 1011h. Node-ID and bit rate do not change.
 
 use crate::master::Master;
 use crate::node::{Node, state};
@@ -12,8 +12,9 @@ use crate::tasks::{Failure, Note};
 /// compared with its description, and set to its previous NMT state.
 ///
 /// # Errors
-/// The device does not restore on command, rejects the command or does not answer; settings without their defaults
-/// after the reset; bus errors and Ctrl-C. The effects list the steps before.
+/// - The device does not restore on command, rejects the command or does not answer.
+/// - Settings do not have their defaults after the reset.
+/// - Bus errors and Ctrl-C.
 pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool) -> Result<StoreReport, Failure> {
     let node = device.id;
     check_capability(master, device, Verb::Restore, group)?;
@@ -48,7 +49,7 @@ pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool
 struct Comparison {
     /// The number of settings that have their default.
     equal: usize,
-    /// Settings that have the same value as before, and not their usual default. The default is not in the manual, or
+    /// Settings with the same value as before that is not their usual default. The default is not in the manual, or
     /// differs between devices.
     unchanged: Vec<Snapshot>,
 }

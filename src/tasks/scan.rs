@@ -18,7 +18,7 @@ use std::time::Duration;
 pub struct Found {
     /// Its node-ID.
     pub node: NodeId,
-    /// Its state, if a heartbeat showed it.
+    /// Its NMT state, if a heartbeat showed it.
     pub state: Option<NmtState>,
     /// Its identity and description, as far as they could be read.
     pub device: Node,
@@ -28,10 +28,10 @@ pub struct Found {
     pub failure: Option<Failure>,
 }
 
-/// Asks every node for its device type, all in parallel, and reads the identity of those that answer.
+/// Reads the device type of every node in parallel, then the identity of those that answer.
 ///
-/// A heartbeat or boot-up message shows a node as well, also one that cannot answer because it is stopped. Nodes without
-/// an answer are asked `rounds` times in total; `timeout` is the wait after the last request.
+/// Heartbeats and boot-up messages also show nodes, for example stopped ones that cannot answer. Nodes without an
+/// answer are asked `rounds` times in total; `timeout` is the wait after the last request.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C. If there is no node, the list is empty.
@@ -62,7 +62,7 @@ pub fn scan(
 /// Listens for `duration` without sending anything. Identities come from the SDO answers that other masters received.
 ///
 /// # Errors
-/// Bus errors. Ctrl-C ends it early.
+/// Bus errors. Ctrl-C ends the scan early.
 pub fn listen(
     master: &mut Master<'_>,
     nodes: &[NodeId],
@@ -80,7 +80,7 @@ pub fn listen(
     Ok(found)
 }
 
-/// The requested nodes that showed themselves, in ascending order.
+/// The requested nodes with a sign of life, in ascending order.
 fn found(presence: &Presence, nodes: &[NodeId]) -> Vec<Found> {
     let of_node = |node| Found {
         node,

@@ -38,7 +38,7 @@ pub struct ReadOptions<'a> {
     pub blocks: BlockMode,
     /// An object of unknown length has at most this many bytes.
     pub longest: usize,
-    /// A length other than the announced one is always a failure: the content goes to a file.
+    /// Whether a length other than the announced one is always a failure. For content that is saved to a file.
     pub is_exact: bool,
     /// Called every 100 ms with the bytes transferred.
     pub progress: &'a mut dyn FnMut(Moved),
@@ -47,7 +47,7 @@ pub struct ReadOptions<'a> {
 /// Reads an object. The type is `data_type`, else that of the description or the standard.
 ///
 /// # Errors
-/// A transfer that failed, bytes that do not fit the type, bus errors and Ctrl-C.
+/// A failed transfer, bytes that do not fit the type, bus errors and Ctrl-C.
 pub fn read(
     master: &mut Master<'_>,
     node: &mut Node,
@@ -75,7 +75,7 @@ pub fn read(
 /// integer as wide as the object.
 ///
 /// # Errors
-/// A value that does not fit the type, an unknown type, a transfer that failed, bus errors and Ctrl-C.
+/// A value that does not fit the type, an unknown type, a failed transfer, bus errors and Ctrl-C.
 pub fn encode(
     master: &mut Master<'_>,
     node: &mut Node,
@@ -96,9 +96,10 @@ pub fn encode(
     Ok((encoded?, data_type))
 }
 
-/// Reads the identity of a node that has no description yet. The description shows which form of a write it accepts.
+/// Reads the identity of a node that has no description yet. The description contains the form of writes that the node
+/// accepts.
 ///
-/// A node that does not answer this is no error. The form is then found out by the write itself.
+/// A missing answer is not an error. The write itself then finds the form.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.
@@ -109,14 +110,13 @@ pub fn find_form(master: &mut Master<'_>, node: &mut Node) -> Result<(), Failure
     }
 }
 
-/// Warnings that signals may be clipped, after a write to an object that decides about it: unit, decimal digits, or the
-/// mapping of a TPDO.
+/// Warnings that signals may be clipped, after a write of unit, decimal digits, or the mapping of a TPDO.
 pub fn clipping(master: &mut Master<'_>, node: &Node, written: ObjectId) -> Vec<tasks::Note> {
     if !matches!(written.index, 0x1a00..=0x1bff | 0x6131 | 0x6132) {
         return Vec::new();
     }
     let overrides: Overrides = node.model.clone().map(|model| (node.id, model)).into_iter().collect();
-    // The write is done. Without these warnings it is a success as well.
+    // The write was successful, so a failure to get these warnings is ignored.
     let found = survey::survey_nodes(master, &[node.id], &overrides).unwrap_or_default();
     found.iter().flat_map(|node| tasks::Note::may_clip(node.id, node.layout().narrow_values())).collect()
 }
@@ -124,7 +124,7 @@ pub fn clipping(master: &mut Master<'_>, node: &Node, written: ObjectId) -> Vec<
 /// Writes bytes to an object, reads them back if `verify` is `true`, and compares. Returns how the write was confirmed.
 ///
 /// # Errors
-/// Those of [`write_with`]; an object that reads differently.
+/// As [`write_with`]; the object has a different value.
 pub fn write(
     master: &mut Master<'_>,
     node: &Node,

@@ -1,4 +1,4 @@
-//! Detects TPDOs that arrive more often than at each SYNC: two devices send them, or a bridge repeats frames.
+//! Detects TPDOs that arrive more than once per SYNC, because two devices send them or a bridge repeats frames.
 
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
@@ -7,10 +7,10 @@ use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use std::collections::BTreeMap;
 
-/// The number of TPDOs that may arrive in excess if another node sends SYNC: their SYNC may not have been received.
+/// The number of surplus TPDOs that is tolerated if another node sends SYNC, because a SYNC may be lost.
 const FOREIGN_TOLERANCE: u64 = 2;
 
-/// A TPDO that arrived although no SYNC was due for it.
+/// A TPDO that arrived without a SYNC for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Surplus {
     /// The node.
@@ -19,7 +19,7 @@ pub(super) struct Surplus {
     pub(super) number: TpdoNumber,
     /// Whether its values differ from those of the previous frame, so that they come from two devices.
     pub(super) differs: bool,
-    /// Whether it is the first one of its kind from this TPDO.
+    /// Whether this is the first surplus of this kind from this TPDO.
     pub(super) is_new: bool,
 }
 
@@ -43,25 +43,25 @@ struct SyncedTpdo {
 #[derive(Debug, Default)]
 pub(super) struct SyncedTpdos {
     tpdos: BTreeMap<CanId, SyncedTpdo>,
-    /// Whether this program sends SYNC: then every SYNC is counted.
+    /// Whether this program sends SYNC, so that every SYNC is counted.
     is_producer: bool,
     /// Whether this program sends remote requests, which it does not receive.
     is_requesting: bool,
 }
 
 impl SyncedTpdos {
-    /// Watches no TPDO yet.
+    /// Creates a detector without TPDOs.
     pub(super) fn new(is_producer: bool, is_requesting: bool) -> SyncedTpdos {
         SyncedTpdos { is_producer, is_requesting, ..SyncedTpdos::default() }
     }
 
-    /// Takes the present setup of a node.
+    /// Adds the present setup of a node.
     pub(super) fn set_up(&mut self, node: &Node) {
         let before = std::mem::take(&mut self.tpdos);
         let (mut own, others): (BTreeMap<_, _>, _) =
             before.into_iter().partition(|(_, tpdo): &(CanId, SyncedTpdo)| tpdo.node == node.id);
         self.tpdos = others;
-        // A node answers remote requests as well.
+        // A node also answers remote requests.
         let is_requesting = self.is_requesting;
         let is_watched = |tpdo: &&Tpdo| tpdo.cob_id.is_valid() && !(is_requesting && tpdo.cob_id.allows_rtr());
         for tpdo in node.tpdos.iter().filter(is_watched) {
@@ -95,7 +95,7 @@ impl SyncedTpdos {
         self.tpdos.values_mut().for_each(|tpdo| (tpdo.syncs, tpdo.requests, tpdo.received) = (0, 0, 0));
     }
 
-    /// Takes a frame. Returns whether it is a TPDO in excess, which must not be used.
+    /// Handles a frame. Returns a surplus TPDO, which must not be used.
     pub(super) fn take(&mut self, frame: &Frame) -> Option<Surplus> {
         let is_producer = self.is_producer;
         let Some(tpdo) = self.tpdos.get_mut(&frame.id()) else {
@@ -131,7 +131,7 @@ mod tests {
     use super::*;
     use crate::canopen::pdo::CobId;
 
-    /// What a TPDO at every n-th SYNC shows: `S` is SYNC and other letters are TPDOs with this content.
+    /// The result for a TPDO at every n-th SYNC: `S` is SYNC, and other letters are TPDOs with this content.
     fn found(is_producer: bool, every: u8, frames: &str) -> Vec<(usize, bool)> {
         let mut node = Node::new(NodeId::new(5).expect("a node-ID"));
         node.tpdos.push(Tpdo {

@@ -6,16 +6,16 @@ use crate::device::unit::Unit;
 use crate::measure::layout::{Signal, Tpdo};
 use crate::node::Node;
 
-/// A change of a node's setup that concerns its measurements.
+/// A change of the setup of a node that affects its measurements.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Another device has this node-ID. Before and after: 1018h:4.
+    /// Another device has this node-ID: its serial number (1018h:4) before and after.
     Device(Option<u32>, Option<u32>),
     /// The node no longer has this TPDO.
     TpdoRemoved(TpdoNumber),
     /// Bit 31 of the COB-ID was set.
     TpdoDisabled(TpdoNumber),
-    /// Parameters of a TPDO.
+    /// Parameters of a TPDO changed.
     Tpdo(TpdoNumber, Vec<TpdoChange>),
     /// The unit of a signal (6131h), before and after.
     Unit(String, Option<Unit>, Option<Unit>),
@@ -28,7 +28,7 @@ pub enum Change {
 /// A changed parameter of a TPDO, with its new value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TpdoChange {
-    /// Signals and objects that are mapped.
+    /// The mapped signals and objects.
     Mapping(Vec<String>),
     /// The CAN identifier.
     CanId(CanId),

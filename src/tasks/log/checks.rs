@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// Every requested signal must exist, and must be mapped into a TPDO unless it is polled.
+/// Checks that every requested signal exists, and is mapped to a TPDO unless it is polled.
 pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), Failure> {
     let polled = matches!(options.mode, Mode::Poll(_));
     for item in &options.wanted {
@@ -49,7 +49,7 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
     Ok(())
 }
 
-/// Whether a signal or object is mapped into a TPDO.
+/// Whether a signal or object is mapped to a TPDO.
 fn carries(node: &Node, tpdo: &Tpdo, item: &Wanted) -> bool {
     let mut entries = tpdo.mapping.iter().map(|entry| entry.object);
     let mut signals = node.signals.iter();
@@ -74,8 +74,8 @@ fn unknown_signal(name: &str, nodes: &[Node]) -> LogFailure {
     LogFailure::UnknownSignal { name: name.to_owned(), known }
 }
 
-/// Refuses if another node sends SYNC: two SYNC producers would double every synchronous TPDO. Adds nodes that restart
-/// meanwhile to `restarted`.
+/// Fails if another node sends SYNC, because two SYNC producers would double every synchronous TPDO. Adds nodes that
+/// restart during the check to `restarted`.
 pub(super) fn refuse_second_sync(
     master: &mut Master<'_>,
     nodes: &[Node],
@@ -109,8 +109,8 @@ pub(super) fn refuse_second_sync(
     Err(Failure::general(LogFailure::SecondSyncProducer))
 }
 
-/// The share of the bus (0 to 1) that SYNC at this interval and the TPDOs after it take, at the greatest frame length;
-/// `None` if the bit rate is unknown.
+/// The bus load (0 to 1) of SYNC at this interval and of the following TPDOs, with the greatest frame length. `None` if
+/// the bit rate is unknown.
 pub(super) fn sync_share(master: &Master<'_>, nodes: &[Node], period: Duration) -> Option<f64> {
     let bit_rate = master.bus().bit_rate()?;
     let tpdos = nodes.iter().flat_map(|node| &node.tpdos).filter(|tpdo| tpdo.cob_id.is_valid());

@@ -10,11 +10,11 @@ use std::time::Duration;
 /// Nothing was recorded, or a recording ended early.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LogFailure {
-    /// No node has a signal with this name. The nodes have the known ones.
+    /// No node has a signal with this name.
     UnknownSignal {
         /// The signal or object.
         name: String,
-        /// The signals of the nodes.
+        /// The existing signals of the nodes.
         known: Vec<String>,
     },
     /// No node has a status object for this signal.
@@ -26,7 +26,7 @@ pub enum LogFailure {
     NotMapped {
         /// The signal or object.
         name: String,
-        /// A TPDO that contains it and is disabled.
+        /// A disabled TPDO that contains it.
         disabled: Option<(NodeId, TpdoNumber)>,
     },
     /// The nodes have different COB-IDs of SYNC (1005h).
@@ -41,51 +41,51 @@ pub enum LogFailure {
     UnknownMapping,
     /// A passive recording received no TPDO of these nodes.
     NothingReceived {
-        /// How long it waited.
+        /// The waiting time.
         within: Duration,
-        /// The nodes, each with the state that its last heartbeat showed.
+        /// The nodes, each with the state in its last heartbeat.
         nodes: Vec<(NodeId, Option<NmtState>)>,
         /// Whether any frame was received.
         has_traffic: bool,
         /// The interface; `None` for a recording that is replayed.
         interface: Option<String>,
     },
-    /// The nodes sent no measurements, for these reasons.
+    /// The nodes sent no measurements, for the reasons given.
     NoMeasurements {
-        /// How long it waited.
+        /// The waiting time.
         within: Duration,
         /// The nodes.
         nodes: Vec<(NodeId, Silence)>,
     },
-    /// These nodes stopped before the end. With `all`, no node was left.
+    /// These nodes stopped before the end.
     NodesLost {
         /// The nodes.
         nodes: Vec<NodeId>,
-        /// Whether no other node is left.
+        /// Whether no other node was left.
         all: bool,
     },
-    /// The file to be continued has other columns.
+    /// The existing file has other columns.
     OtherColumns {
         /// The name of the file.
         file: String,
-        /// Its first line.
+        /// The first line of the file.
         found: String,
         /// The columns of the new rows.
         expected: String,
     },
-    /// The reader closed the output before the planned end. This many rows were written.
+    /// The reader closed the output before the planned end.
     OutputClosed {
-        /// Number of rows.
+        /// The number of rows.
         rows: u64,
     },
-    /// Ctrl-C before the planned end. This many rows were written.
+    /// Ctrl-C before the planned end.
     EndedEarly {
-        /// Number of rows.
+        /// The number of rows.
         rows: u64,
     },
-    /// The output could not keep up: this many rows were lost.
+    /// Rows were lost because the output was too slow.
     RowsLost {
-        /// Number of rows.
+        /// The number of rows.
         rows: u64,
         /// The name of the file or stream.
         output: String,
@@ -100,7 +100,7 @@ pub enum LogFailure {
         /// The name of the file.
         file: String,
     },
-    /// The output of the events could not keep up.
+    /// Events were lost because the output was too slow.
     EventsLost {
         /// The name of the file or stream.
         output: String,

@@ -13,11 +13,11 @@ const TOLERANCE: Duration = Duration::from_millis(50);
 /// The effect of a heartbeat or boot-up message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum HeartbeatChange {
-    /// Nothing.
+    /// No effect.
     None,
     /// The heartbeat was lost and is back.
     Back,
-    /// The node has another state than at its last heartbeat.
+    /// The state differs from that in the last heartbeat.
     State(NmtState),
 }
 
@@ -47,14 +47,14 @@ impl HeartbeatMonitor {
         }
     }
 
-    /// Takes a heartbeat or boot-up message.
+    /// Handles a heartbeat or boot-up message.
     pub(super) fn take(&mut self, node: NodeId, life: Life, now: Mono) -> HeartbeatChange {
         let Some(heartbeat) = self.heartbeats.get_mut(&node) else { return HeartbeatChange::None };
         heartbeat.last = now;
         let was_lost = std::mem::take(&mut heartbeat.is_lost);
         let state = match life {
             Life::State(state) => Some(state),
-            // A boot-up does not show the state that follows.
+            // A boot-up message does not show the following state.
             Life::BootUp => None,
         };
         let before = std::mem::replace(&mut heartbeat.state, state);

@@ -1,9 +1,9 @@
-//! The usual interval of messages. It decides which interval is a gap, and when the sender counts as silent.
+//! The usual interval of messages. From it follow gaps, and the time after which the sender is silent.
 
 use crate::bus::Mono;
 use std::time::Duration;
 
-/// Without `--max-gap`, an interval of more than this many usual ones is a gap.
+/// Without `--max-gap`, an interval longer than this many usual intervals is a gap.
 const GAP_FACTOR: u32 = 3;
 
 /// A sender is silent after this many usual intervals.
@@ -20,16 +20,17 @@ pub(super) struct IntervalTracker {
 }
 
 impl IntervalTracker {
-    /// Adds a message received at `now`. Returns the interval since the last one if it is a gap: longer than `max_gap`, or
-    /// than three usual intervals if there is no `max_gap`.
+    /// Adds a message received at
+    /// `now`. Returns the interval since the last message if it is a gap: longer than `max_gap`, or by default longer
+    /// than three usual intervals.
     pub(super) fn add(&mut self, now: Mono, max_gap: Option<Duration>) -> Option<Duration> {
         let mut gap = None;
         if let Some(last) = self.last.filter(|&last| last < now) {
             let interval = now.since(last);
             let longest = max_gap.or(self.usual.map(|usual| usual * GAP_FACTOR));
             gap = longest.filter(|&longest| interval > longest).map(|_| interval);
-            // In the average, an interval counts as at most three usual ones. So one gap does not hide the next one. If a
-            // sender becomes slower, its new interval is the usual one after a few messages.
+            // For the average, an interval is limited to three usual ones, so that one gap does not hide the next gap.
+            // If a sender becomes slower, the average follows within a few messages.
             self.usual = Some(match self.usual {
                 Some(usual) => (usual * 7 + interval.min(usual * GAP_FACTOR)) / 8,
                 None => interval,
@@ -39,18 +40,18 @@ impl IntervalTracker {
         gap
     }
 
-    /// Whether anything was ever received.
+    /// Whether a message was received so far.
     pub(super) fn has_received(&self) -> bool {
         self.last.is_some()
     }
 
-    /// How long nothing was received, if that is longer than usual.
+    /// The time since the last message, if it is longer than usual.
     pub(super) fn silence(&self, now: Mono) -> Option<Duration> {
         let limit = (self.usual.unwrap_or_default() * SILENCE_FACTOR).max(MIN_SILENCE);
         self.last.map(|last| now.since(last)).filter(|&silence| silence > limit)
     }
 
-    /// Whether nothing was ever received, or nothing for longer than usual.
+    /// Whether no message was received so far, or none for longer than usual.
     pub(super) fn is_lost(&self, now: Mono) -> bool {
         self.last.is_none() || self.silence(now).is_some()
     }

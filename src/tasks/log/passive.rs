@@ -1,5 +1,5 @@
-//! Passive recording. The setup of the nodes comes from the SDO traffic of another master, or from a description that the
-//! user names. It is never guessed.
+//! Passive recording. The setup of the nodes comes from the SDO traffic of another master, or from a description named
+//! by the user. The setup is never guessed.
 
 use crate::bus::Received;
 use crate::canopen::frame::Frame;
@@ -48,8 +48,8 @@ impl SetupListener {
         nodes.into_iter().for_each(|node| self.update(node, decoder));
     }
 
-    /// Takes a frame. If it completes the setup of a TPDO, `decoder` decodes that TPDO from now on. Returns the recorded node
-    /// if the frame contained information about it.
+    /// Handles a frame. If the frame completes the setup of a TPDO, `decoder` decodes this TPDO from now on. Returns
+    /// the recorded node if the frame contained information about the node.
     pub(in crate::tasks) fn take(&mut self, received: &Received, decoder: &mut Decoder) -> Option<NodeId> {
         let frame = &received.frame;
         if let Some((node, _)) = self.overheard.take(frame).filter(|(node, _)| self.nodes.contains(node)) {
@@ -65,7 +65,8 @@ impl SetupListener {
         None
     }
 
-    /// A node has restarted: it may have lost its setup. Its identity and the descriptions of the user stay valid.
+    /// Handles a restart of a node, which may have lost its setup. Its identity and the descriptions of the user stay
+    /// valid.
     pub(in crate::tasks) fn forget(&mut self, node: NodeId, decoder: &mut Decoder) {
         self.overheard.forget(node, is_setup);
         decoder.remove(node);
@@ -116,7 +117,7 @@ impl SetupListener {
         }
     }
 
-    /// The known part of a node. It contains only TPDOs with known COB-ID and complete mapping.
+    /// The known part of a node. The result contains only TPDOs with a known COB-ID and a complete mapping.
     pub(in crate::tasks) fn known_node(&self, id: NodeId) -> Node {
         let mut node = Node::new(id);
         node.identity = self.overheard.identity(id);
@@ -195,7 +196,7 @@ fn is_setup(object: ObjectId) -> bool {
     matches!(object.index, 0x1800..=0x1bff | 0x6131 | 0x6132)
 }
 
-/// The node that sends TPDOs with this COB-ID by the predefined connection set.
+/// The node that sends TPDOs with this COB-ID in the predefined connection set.
 fn predefined_tpdo(frame: &Frame) -> Option<NodeId> {
     match frame.id() {
         CanId::Standard(id) if matches!(id & 0x780, 0x180 | 0x280 | 0x380 | 0x480) && !frame.is_remote() => {

@@ -18,7 +18,7 @@ pub(super) struct Poll {
     period: Duration,
     cycles: u64,
     targets: Vec<Target>,
-    /// Which targets are polled at present.
+    /// Whether each target is polled at present.
     live: Vec<bool>,
     open: BTreeMap<Ticket, (usize, Part)>,
     answers: Vec<Parts>,
@@ -80,7 +80,7 @@ impl Poll {
         }
         for mut target in targets(node, &own, &mut number)? {
             target.reading.source = decoder.add_source(target.source.clone());
-            // Reuse the places of earlier targets of this node.
+            // Reuse the entries of earlier targets of this node.
             let is_free = |&at: &usize| {
                 !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == node.id
             };
@@ -97,7 +97,7 @@ impl Poll {
         Ok(())
     }
 
-    /// Why the last poll of a silent node or source failed.
+    /// The error of the last poll of a silent node or source.
     pub(super) fn error(&self, silent: Silent) -> Option<&SdoError> {
         let is_meant = |target: &Target| match silent {
             Silent::Node(node) => target.source.node == node,
@@ -110,7 +110,7 @@ impl Poll {
             .find_map(|(_, error)| error.as_ref())
     }
 
-    /// Stops polling a node. Answers under way are ignored.
+    /// Stops polling a node. Pending answers are ignored.
     pub(super) fn pause(&mut self, node: NodeId) {
         for (target, live) in self.targets.iter().zip(&mut self.live) {
             *live &= target.source.node != node;
@@ -149,7 +149,7 @@ impl Poll {
             return 0;
         }
         self.cycles = cycles;
-        // Of several cycles only the first one is started.
+        // If several cycles are due, only the first one is started.
         let late = cycles - cycle - 1;
         let mut skipped = 0u64;
         for (at, target) in self.targets.iter().enumerate() {
@@ -163,7 +163,7 @@ impl Poll {
                 continue;
             }
             parts.cycle = cycle;
-            // The value last: its answer completes the sample, so rows are in order of time.
+            // The value is requested last, because its answer completes the sample. So rows are in order of time.
             for (request, part) in requests(target).into_iter().zip([Part::Value, Part::Status]).rev() {
                 self.open.insert(master.start(request), (at, part));
                 parts.under_way += 1;
@@ -172,7 +172,7 @@ impl Poll {
         skipped
     }
 
-    /// Takes an answer; a complete one becomes a sample. Returns the first of several failures in a row.
+    /// Handles an answer. Complete answers become a sample. Returns the first of several consecutive failures.
     pub(super) fn answer(
         &mut self,
         ticket: Ticket,

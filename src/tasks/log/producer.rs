@@ -1,4 +1,4 @@
-//! The SYNC producer: sends SYNC without drift, and measures how late each one was. It also paces remote requests.
+//! The SYNC producer: sends SYNC without drift, and measures the delay of each SYNC. It also paces remote requests.
 
 use super::nth;
 use crate::bus::Mono;
@@ -23,13 +23,13 @@ pub struct SyncStatistics {
 /// Sends SYNC at an interval.
 pub(super) struct Producer {
     interval: Duration,
-    /// The COB-ID of SYNC; `None`: it only paces remote requests.
+    /// The COB-ID of SYNC; `None` if the producer only paces remote requests.
     id: Option<CanId>,
     /// 1019h: the counter in the SYNC message runs from 1 to this value. `None`: SYNC has no counter.
     overflow: Option<u8>,
     start: Mono,
     slot: u64,
-    /// The slot of the SYNC that is queued and not sent yet.
+    /// The slot of the SYNC that is queued but not sent yet.
     waiting: Option<u64>,
     statistics: SyncStatistics,
 }
@@ -44,7 +44,7 @@ impl Producer {
         self.start = at;
     }
 
-    /// The next SYNC message. Its counter goes on only if the previous message was sent.
+    /// The next SYNC message. The counter continues only if the previous message was sent.
     fn frame(&self, id: CanId) -> Frame {
         match self.overflow {
             None => Frame::empty(id),
@@ -97,7 +97,7 @@ impl Producer {
 }
 
 /// The slot that follows `slot`. If the program was stopped, the missed SYNC messages are omitted. Otherwise they would
-/// be sent in a burst, closer together than the interval.
+/// be sent in a burst.
 fn next_slot(start: Mono, now: Mono, interval: Duration, slot: u64) -> u64 {
     let passed = now.since(start).as_nanos() / interval.as_nanos().max(1);
     let passed = u64::try_from(passed).unwrap_or(u64::MAX - 2);

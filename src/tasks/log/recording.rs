@@ -49,9 +49,9 @@ pub(super) struct Recording<'o> {
     emergencies: Emergencies,
     due: DueTpdos,
     synced: SyncedTpdos,
-    /// TPDOs that two devices send: they make no rows.
+    /// TPDOs that two devices send. They are ignored.
     pub(super) two_senders: BTreeMap<NodeId, TpdoNumber>,
-    /// The values of the first SYNC, until it is known that no second device answers it.
+    /// The values of the first SYNC. They are kept until it is known that no second device answers.
     early: Vec<Vec<Sample>>,
     early_until: Option<Mono>,
     rereads: Rereads,
@@ -73,10 +73,10 @@ pub(super) struct Recording<'o> {
     /// The last messages of each node.
     pub(super) heard: BTreeMap<NodeId, Heard>,
     pub(super) remarks: Vec<Remark>,
-    /// Doubts about sources that were reported.
+    /// The reported doubts about sources.
     doubts: BTreeSet<(usize, Doubt)>,
     interrupted: bool,
-    /// The samples of the current frame. It is kept to avoid allocations.
+    /// The samples of the current frame. Kept to avoid allocations.
     samples: Vec<Sample>,
 }
 
@@ -136,7 +136,7 @@ impl<'o> Recording<'o> {
         }
     }
 
-    /// Refuses to request a TPDO that answers no requests (bit 30 of its COB-ID).
+    /// Fails if a requested TPDO does not answer remote requests (bit 30 of its COB-ID).
     pub(super) fn refuse_without_rtr(&self) -> Result<(), Failure> {
         let mut without = self.recorded_tpdos().filter(|(_, tpdo)| !tpdo.cob_id.allows_rtr());
         match (self.options.mode, without.next()) {
@@ -192,12 +192,12 @@ impl<'o> Recording<'o> {
         self.interrupted
     }
 
-    /// The user ended the recording.
+    /// Records that the user ended the recording.
     pub(super) fn set_interrupted(&mut self) {
         self.interrupted = true;
     }
 
-    /// Expects no samples from nodes without any of the requested signals. At least one node has them.
+    /// Expects no samples from nodes without any of the requested signals. At least one node has such signals.
     pub(super) fn ignore_nodes_without_signals(&mut self) {
         if self.options.wanted.is_empty() {
             return;
@@ -224,12 +224,12 @@ impl<'o> Recording<'o> {
         nodes.for_each(|node| self.synced.set_up(&node));
     }
 
-    /// Makes room for the statistics of all known sources.
+    /// Adds statistics for all known sources.
     pub(super) fn update_sources(&mut self) {
         self.tally.set_sources(self.decoder.sources());
     }
 
-    /// The recorded nodes' TPDOs, emergencies, heartbeats, SDO messages, and SYNC.
+    /// The filters for TPDOs, emergencies, heartbeats and SDO messages of the recorded nodes, and for SYNC.
     pub(super) fn filters(&self) -> Filters {
         let mut ids: Vec<CanId> = self.decoder.can_ids().collect();
         for node in &self.nodes {
@@ -242,7 +242,7 @@ impl<'o> Recording<'o> {
         Filters::Only(ids)
     }
 
-    /// Takes a frame.
+    /// Handles a frame.
     fn frame(&mut self, received: &Received, master: &mut Master<'_>, observer: &mut dyn Observer) -> ControlFlow<()> {
         self.tally.extend_to(received.at.mono);
         self.samples.clear();
@@ -279,7 +279,7 @@ impl<'o> Recording<'o> {
         ControlFlow::Continue(())
     }
 
-    /// Takes the result of an SDO transfer: of a reread or of a poll.
+    /// Handles the result of an SDO transfer: of a reread or of a poll.
     fn answer(
         &mut self,
         ticket: Ticket,
@@ -304,7 +304,7 @@ impl<'o> Recording<'o> {
         Ok(self.take_samples(cycle, observer))
     }
 
-    /// Passes on the values of the first SYNC.
+    /// Passes the values of the first SYNC to the observer.
     fn take_early(&mut self, observer: &mut dyn Observer) -> ControlFlow<()> {
         if self.early_until.take().is_none() {
             return ControlFlow::Continue(());
@@ -316,7 +316,7 @@ impl<'o> Recording<'o> {
         ControlFlow::Continue(())
     }
 
-    /// Counts the samples and passes them on. `cycle` is the cycle of the poll that they answer.
+    /// Counts the samples and passes them to the observer. `cycle` is the cycle of their poll.
     fn take_samples(&mut self, cycle: Option<u64>, observer: &mut dyn Observer) -> ControlFlow<()> {
         if let Some(count) = self.options.count {
             let left = usize::try_from(count - self.tally.rows).unwrap_or(usize::MAX);

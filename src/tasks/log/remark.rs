@@ -15,25 +15,25 @@ use std::time::Duration;
 pub enum Remark {
     /// The node has none of the requested signals.
     NoRequestedSignal(NodeId),
-    /// Both nodes send TPDOs with this COB-ID: they make no rows.
+    /// Both nodes send TPDOs with this COB-ID. These TPDOs are ignored.
     SharedCobId(CanId, [NodeId; 2]),
-    /// The values were sent on remote request: it is not proven that each is new.
+    /// The values were sent on remote request, so it is not proven that each value is new.
     FreshnessNotProven,
     /// A TPDO of the node arrives twice at a SYNC, with the same values.
     RepeatedTpdo(NodeId, TpdoNumber),
-    /// A TPDO of the node arrives twice at a SYNC, with different values: it makes no rows.
+    /// A TPDO of the node arrives twice at a SYNC, with different values. It is ignored.
     TwoSenders(NodeId, TpdoNumber),
     /// A value could not be polled.
     PollFailed(SdoError),
-    /// The node's setup changed while frames were lost. The rows of this time before the change was found may be wrong.
+    /// The setup of the node changed while frames were lost. Rows within this time before the detection may be wrong.
     ChangedWhileFramesLost(NodeId, Duration),
-    /// The node could not be read again: its later frames made no rows.
+    /// The node could not be read again. Its later frames were ignored.
     NotReadAgain(NodeId),
     /// These nodes were started. Their previous state is unknown, so they stay operational.
     LeftOperational(Vec<NodeId>),
-    /// The node was operational, and its last heartbeat shows another state.
+    /// The node was operational, but its last heartbeat shows another state.
     NotOperational(NodeId, Box<Silence>),
-    /// The nodes were not returned to their previous NMT states.
+    /// The previous NMT states of the nodes were not restored.
     StatesNotRestored(Box<Failure>),
     /// This many SYNC messages were omitted while the interface was down.
     SyncsOmittedWhileDown(u64),
@@ -45,6 +45,6 @@ pub enum Remark {
     Doubt(NodeId, String, Doubt),
     /// The values of a signal may be clipped.
     MayClip(NodeId, NarrowValue),
-    /// The node, or only this signal of it, sent no measurements, for this reason.
+    /// The node, or only this signal, sent no measurements for this reason.
     NoMeasurements(NodeId, Option<String>, Box<Silence>),
 }

@@ -1,8 +1,8 @@
 //! Nodes whose setup must be read again.
 //!
-//! Anything that may have changed the mapping, unit or digits of a node makes its setup uncertain. From then on its
-//! frames make no rows, until the setup was read again. A missing row is reported and counted; a row decoded with an
-//! old mapping would be a wrong number that looks right.
+//! After any event that may have changed the mapping, unit or digits of a node, its setup is uncertain. Its frames are
+//! then ignored until the setup was read again. Missing rows are counted and reported. Rows decoded with an old mapping
+//! would look right but be wrong.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
@@ -16,7 +16,7 @@ use crate::node::survey::BackgroundSurvey;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A node is read again after this time without a write: another master that changes a mapping writes many objects.
+/// A node is read again after this time without a write, because a change of a mapping consists of many writes.
 const WRITE_SETTLE_TIME: Duration = Duration::from_millis(500);
 /// Interval between two attempts to read a node that does not answer.
 const RETRY_INTERVAL: Duration = Duration::from_secs(1);
@@ -33,10 +33,10 @@ pub(super) enum RereadReason {
     Disconnected,
     /// Another master wrote an object that its TPDOs depend on.
     Written,
-    /// A TPDO has another length than its mapping and made no row. Other TPDOs still make rows.
+    /// The length of a TPDO differs from its mapping, so the TPDO was ignored. Other TPDOs are still recorded.
     WrongLength,
-    /// Frames were lost, perhaps also a boot-up or a write. This is rare, so the node's frames still make rows. If its
-    /// setup did change, the affected time is reported.
+    /// Frames were lost, perhaps also a boot-up message or a write. This is rare, so frames of the node are still
+    /// recorded. If the setup did change, the affected time is reported.
     FramesLost,
 }
 
@@ -47,7 +47,7 @@ struct Pending {
     survey: Option<BackgroundSurvey>,
     /// Whether the node may need a start command.
     may_need_start: bool,
-    /// Since when the node's frames make rows although its setup is uncertain.
+    /// Since when frames of the node are recorded although its setup is uncertain.
     recorded_since: Option<Mono>,
     /// Whether a failed attempt was reported.
     is_failure_reported: bool,
@@ -56,9 +56,9 @@ struct Pending {
 /// A node that was read again.
 pub(super) struct Reread {
     pub(super) node: Node,
-    /// Whether it may need a start command.
+    /// Whether the node may need a start command.
     pub(super) may_need_start: bool,
-    /// Since when its frames made rows although its setup was uncertain.
+    /// Since when its frames were recorded although its setup was uncertain.
     pub(super) recorded_since: Option<Mono>,
 }
 
@@ -82,7 +82,7 @@ impl Rereads {
         }
     }
 
-    /// Requests that a node is read again. A survey in progress is started again. Returns `false` if no reread is needed.
+    /// Requests that a node is read again. A survey in progress is restarted. Returns `false` if no reread is needed.
     pub(super) fn request(&mut self, node: NodeId, why: RereadReason, now: Mono, master: &mut Master<'_>) -> bool {
         if why == RereadReason::WrongLength {
             if self.wrong_lengths.get(&node).is_some_and(|&before| now.since(before) < WRONG_LENGTH_INTERVAL) {
@@ -143,7 +143,7 @@ impl Rereads {
         self.pending.values().any(|pending| pending.has(ticket))
     }
 
-    /// Takes the result of a transfer. Returns a node when it was read completely, and the first failure of a node.
+    /// Handles the result of a transfer. Returns a node that was read completely, or the first failure of a node.
     pub(super) fn take(
         &mut self,
         ticket: Ticket,
@@ -171,7 +171,7 @@ impl Rereads {
         self.wrong_lengths.remove(&node);
     }
 
-    /// The nodes whose frames make no rows.
+    /// The nodes whose frames are ignored.
     pub(super) fn paused(&self) -> impl Iterator<Item = NodeId> + '_ {
         self.pending.iter().filter(|(_, pending)| pending.recorded_since.is_none()).map(|(&node, _)| node)
     }

@@ -1,4 +1,4 @@
-//! Which nodes and signals of a recording have no value, and why.
+//! Finds nodes and signals of a recording without values, and the reasons.
 
 use super::recording::Recording;
 use super::{FIRST_SAMPLE_TIMEOUT, LogFailure, LogOptions, Mode};
@@ -14,7 +14,7 @@ use crate::tasks::diagnosis::{
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A node without values, or one source of a node that has others.
+/// A node without values, or a source without values of a node with other values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Silent {
     Node(NodeId),
@@ -29,10 +29,10 @@ impl Silent {
     }
 }
 
-/// The questions to silent nodes of a recording, and the answers.
+/// The reads from silent nodes of a recording, and the answers.
 #[derive(Default)]
 pub(super) struct Questions {
-    /// Whether the nodes were asked during the recording.
+    /// Whether the nodes were read during the recording.
     pub(super) were_asked: bool,
     pub(super) open: Option<Inquiry>,
     pub(super) findings: BTreeMap<NodeId, Findings>,
@@ -66,7 +66,7 @@ fn waited(options: &LogOptions) -> Duration {
 }
 
 impl Recording<'_> {
-    /// The nodes without values, and the sources without values of nodes that have others.
+    /// The nodes without values, and the sources without values of other nodes.
     pub(super) fn silent(&self) -> Vec<Silent> {
         let expected = |node: &&Node| self.is_expected(node.id);
         let mut silent = Vec::new();
@@ -124,7 +124,7 @@ impl Recording<'_> {
         diagnose(node, &carries, &heard, self.questions.findings.get(&id), &situation)
     }
 
-    /// Whether a TPDO carries values of a silent node or source that are recorded.
+    /// Whether a TPDO contains recorded values of a silent node or source.
     fn carries(&self, silent: Silent, tpdo: &Tpdo) -> bool {
         let id = tpdo.cob_id.can_id();
         match silent {
@@ -162,7 +162,7 @@ impl Recording<'_> {
         asked.into_iter().collect()
     }
 
-    /// Asks the silent nodes during a recording. The answers are reported when all are there.
+    /// Reads objects of the silent nodes during a recording. The reasons are reported after all answers.
     pub(super) fn ask_silent_nodes_meanwhile(&mut self, master: &mut Master<'_>) {
         self.questions.were_asked = true;
         let asked = self.questions();
@@ -171,7 +171,8 @@ impl Recording<'_> {
         }
     }
 
-    /// Asks the silent nodes at the end of a recording. A failure of the bus only makes the reasons less exact.
+    /// Reads objects of the silent nodes at the end of a recording. After a failure of the bus, the reasons are only
+    /// less exact.
     pub(super) fn ask_silent_nodes(&mut self, master: &mut Master<'_>) {
         let asked = self.questions();
         if asked.is_empty() || self.is_interrupted() || self.rows() > 0 && self.is_short() {

@@ -10,10 +10,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// With a slower heartbeat the state of a node counts as unknown.
+/// If the heartbeat is slower, the state of a node is unknown.
 const MAX_HEARTBEAT_PERIOD: Duration = Duration::from_secs(2);
 
-/// How often it is checked whether the last commands were sent.
+/// The interval of checks whether the last commands were sent.
 const SEND_INTERVAL: Duration = Duration::from_millis(10);
 
 /// The nodes that were started, and their previous states.
@@ -23,7 +23,7 @@ pub(super) struct NmtStates {
 }
 
 impl NmtStates {
-    /// Starts the nodes that are not known to be operational. Adds nodes that restart meanwhile to `restarted`.
+    /// Starts the nodes that are not known to be operational. Adds nodes that restart during this time to `restarted`.
     pub(super) fn start(
         &mut self,
         master: &mut Master<'_>,
@@ -57,7 +57,7 @@ impl NmtStates {
         self.started.contains_key(&node)
     }
 
-    /// Returns each node to its previous state if that is known.
+    /// Restores the previous state of each node, if known.
     pub(super) fn restore(&mut self, master: &mut Master<'_>) -> Result<(), Error> {
         master.cancel();
         for (&node, &before) in &self.started {
@@ -69,7 +69,7 @@ impl NmtStates {
             master.send(command.frame(Some(node)));
         }
         while master.is_sending() {
-            // Ctrl-C does not end the restoring.
+            // Ctrl-C does not interrupt this.
             let until = master.now() + SEND_INTERVAL;
             wait(master, until, Policy::Observe, |_, _| ControlFlow::<()>::Continue(()))?;
         }

@@ -1,5 +1,5 @@
-//! Sets node-ID and bit rate: finds the device, checks that the new node-ID is free, configures, stores, resets,
-//! confirms.
+//! Sets node-ID and bit rate. Steps: find the device, check that the new node-ID is free, configure, store, reset,
+//! confirm.
 
 use super::cob_ids::{CobIds, cob_ids};
 use super::confirm::{Confirmed, confirm};
@@ -40,7 +40,7 @@ pub struct Job<'a> {
     pub retime: bool,
     /// The method.
     pub via: Via,
-    /// Whether [`Target::Only`] goes on if there is more than one device.
+    /// Whether [`Target::Only`] continues if there is more than one device.
     pub force: bool,
     /// The descriptions that the user named.
     pub descriptions: Descriptions<'a>,
@@ -94,7 +94,7 @@ pub fn assign(master: &mut Master<'_>, job: &Job<'_>, notify: Notify<'_>) -> Res
     result.map_err(|failure| work.explain(failure))
 }
 
-/// Everything that is checked before anything is changed.
+/// Makes all checks before the first change.
 fn prepare(
     master: &mut Master<'_>,
     job: &Job<'_>,
@@ -120,7 +120,7 @@ fn prepare(
     Ok((device, method, rate))
 }
 
-/// A job with the facts that were found before the first change.
+/// A job with the facts known before the first change.
 struct Work<'a> {
     job: &'a Job<'a>,
     device: &'a LssDevice,
@@ -152,7 +152,7 @@ impl Work<'_> {
             }
         };
         notify(device.note(LssEvent::Progress(self.progress.clone())));
-        // After a reset the device would work at a bit rate at which the host cannot hear it.
+        // After a reset, the device would use a bit rate different from that of the host.
         let Some(new) = job.id.filter(|_| follows || !leaves_host) else { return Ok(report) };
         (report.confirmed, report.boot_time) = confirm(master, device, new, self.node_to_reset(new)?, booted)?;
         report.cob_ids = self.cob_ids(master)?;
@@ -219,8 +219,8 @@ impl Work<'_> {
         Ok(new.is_some_and(|new| session.booted.contains(&new)))
     }
 
-    /// The objects to use after a failure: the device answers no LSS, nothing was changed, and the user did not choose
-    /// the method.
+    /// The objects to use after a failure, if the device does not answer LSS, nothing was changed, and the user did not
+    /// choose the method.
     fn objects_after(&self, failure: &Failure) -> Option<AssignEntry> {
         let is_lss = self.job.via == Via::Auto && self.method.kind == AssignKind::Lss && !self.job.retime;
         let is_silent = is_lss && is_silent(self.device, failure) && self.progress.stored == Stage::NotDone;
@@ -262,8 +262,8 @@ fn configure(lss: &mut Lss<'_, '_>, job: &Job<'_>, with_rate: bool, progress: &m
     Ok(())
 }
 
-/// Sets back values that were configured and not stored: otherwise a later reset would activate them. Failures are
-/// ignored, since the first one is reported.
+/// Restores values that were configured but not stored, because a later reset would activate them. Failures are
+/// ignored, because the first failure is reported.
 fn revert(lss: &mut Lss<'_, '_>, device: &LssDevice, old_rate: Option<u8>, progress: &mut Progress) {
     if let Some((_, stage)) = &mut progress.id
         && stage.may_hold()

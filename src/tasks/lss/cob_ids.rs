@@ -1,4 +1,4 @@
-//! The COB-IDs of a device after its node-ID was changed: those that did not follow.
+//! Finds COB-IDs of a device that still belong to its old node-ID.
 
 use crate::bus::Filters;
 use crate::canopen::id::{CanId, NodeId};
@@ -9,7 +9,7 @@ use crate::device::catalog::Model;
 use crate::master::{Error, Master};
 use crate::node::read::read_values;
 
-/// The COB-ID of the emergency, and its function code.
+/// The object of the emergency COB-ID, and its function code.
 const EMERGENCY: (ObjectId, u32) = (ObjectId::new(0x1014, 0), 0x080);
 
 /// The TPDOs with a predefined COB-ID, and their function codes.

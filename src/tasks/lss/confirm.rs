@@ -12,13 +12,13 @@ use crate::tasks::Failure;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The longest wait for a boot-up message. No manual gives a time; a device may write its memory first.
+/// The longest wait for a boot-up message. No manual gives a time, and a device may write its memory before.
 const BOOT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// How long a device is asked after its boot-up message. Some do not answer for 2 to 3 s.
+/// How long requests are repeated after the boot-up message. Some devices do not answer for 2 to 3 s.
 const FIRST_ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// The pause before a silent device is asked again.
+/// The pause before the next request to a silent device.
 const ASK_AGAIN_PAUSE: Duration = Duration::from_millis(100);
 
 /// The confirmation of the new values.
@@ -43,7 +43,7 @@ impl Confirmed {
     }
 }
 
-/// Resets the node `reset`, if there is one, and waits for the device under the node-ID `new`. Returns the proof, and
+/// Resets the node `reset`, if given, and waits for the device with the node-ID `new`. Returns the confirmation, and
 /// the time until the boot-up message.
 ///
 /// # Errors
@@ -89,7 +89,7 @@ fn boot_up(master: &mut Master<'_>, new: NodeId, start: Mono) -> Result<Option<D
     Ok(booted.done())
 }
 
-/// The device that answers under the new node-ID. After a boot-up message a silent device is asked again.
+/// The device that answers at the new node-ID. After a boot-up message, requests to a silent device are repeated.
 fn first_answer(master: &mut Master<'_>, new: NodeId, has_booted: bool) -> Result<Occupant, Failure> {
     let until = master.now() + FIRST_ANSWER_TIMEOUT;
     loop {
@@ -102,7 +102,7 @@ fn first_answer(master: &mut Master<'_>, new: NodeId, has_booted: bool) -> Resul
     }
 }
 
-/// The failure of a device that was not seen under its new node-ID.
+/// The failure of a device that does not respond at its new node-ID.
 fn not_seen(
     master: &mut Master<'_>,
     device: &LssDevice,

@@ -1,4 +1,4 @@
-//! The device that a task works on, and how LSS reaches it.
+//! The device of a task, and how it is addressed by LSS.
 
 use super::Via;
 use super::event::{LssEvent, LssFact};
@@ -23,7 +23,7 @@ pub struct DeviceName {
     pub address: Option<LssAddress>,
 }
 
-/// How LSS reaches a device.
+/// How a device is addressed by LSS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reach {
     /// By its identity (40h to 43h).
@@ -32,25 +32,25 @@ pub(super) enum Reach {
     Global,
 }
 
-/// The device that a task works on.
+/// The device of a task.
 #[derive(Clone, Debug)]
 pub(super) struct LssDevice {
     /// Its identity; `None` if it is unknown.
     pub address: Option<LssAddress>,
     /// Its present node-ID; `None` if it has none or it is unknown.
     pub node: Option<NodeId>,
-    /// Whether it is known to have no node-ID.
+    /// Whether the device is known to have no node-ID.
     pub is_unconfigured: bool,
-    /// Whether a message to its node-ID reaches this device and no other.
+    /// Whether a message to its node-ID reaches only this device.
     pub is_alone: bool,
     /// Its description; `None` for an unknown device.
     pub model: Option<Arc<Model>>,
-    /// How LSS reaches it.
+    /// How the device is addressed by LSS.
     pub reach: Reach,
 }
 
 impl LssDevice {
-    /// The device with this identity, of which nothing else is known.
+    /// The device with this identity; no other facts are known.
     pub(super) fn with_address(address: LssAddress) -> LssDevice {
         LssDevice {
             address: Some(address),
@@ -67,7 +67,7 @@ impl LssDevice {
         DeviceName { node: self.node, address: self.address }
     }
 
-    /// The node-ID, if a message to it reaches this device and no other.
+    /// The node-ID, if a message to it reaches only this device.
     pub(super) fn own_node(&self) -> Option<NodeId> {
         self.node.filter(|_| self.is_alone)
     }
@@ -114,9 +114,9 @@ impl LssDevice {
 /// The descriptions that the user named.
 #[derive(Clone, Copy, Debug)]
 pub struct Descriptions<'a> {
-    /// For nodes.
+    /// The descriptions for nodes.
     pub overrides: &'a Overrides,
-    /// For the target, independently of its node-ID.
+    /// The description for the target, independent of its node-ID.
     pub given: Option<&'a Arc<Model>>,
 }
 
@@ -124,7 +124,7 @@ impl Descriptions<'_> {
     /// The description of a device: the one that the user named, else by its SDO answers, else by its identity.
     ///
     /// # Errors
-    /// Bus errors and Ctrl-C; a node that stops answering.
+    /// Bus errors and Ctrl-C; the node stops answering.
     pub(super) fn model_of(&self, master: &mut Master<'_>, device: &LssDevice) -> Result<Option<Arc<Model>>, Failure> {
         if let Some(given) = self.given {
             return Ok(Some(Arc::clone(given)));

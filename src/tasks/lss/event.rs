@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// An event of an LSS task.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LssFact {
-    /// The device that it concerns.
+    /// The device.
     pub device: DeviceName,
     /// The event.
     pub event: LssEvent,
@@ -28,22 +28,22 @@ pub enum LssEvent {
     },
     /// The bit rate table of the device is unknown; that of CiA 305 is used.
     StandardRateTable,
-    /// How far the change has come.
+    /// The completed steps of the change.
     Progress(Progress),
-    /// The device does not answer LSS; it is tried again in STOPPED.
+    /// The device does not answer LSS; the request is repeated in STOPPED.
     RetryInStopped,
-    /// The device is in PRE-OPERATIONAL; its state before is unknown.
+    /// The device is in PRE-OPERATIONAL; its previous state is unknown.
     LeftPreOperational,
-    /// The device goes to a new bit rate together with the host.
+    /// The device changes to a new bit rate together with the host.
     ChangingRate {
-        /// In bit/s.
+        /// The bit rate in bit/s.
         bit_rate: u32,
         /// The time until the change in milliseconds.
         delay_ms: u16,
     },
     /// The device answers at the new bit rate.
     AnswersAt {
-        /// In bit/s.
+        /// The bit rate in bit/s.
         bit_rate: u32,
     },
     /// The device does not answer LSS; its objects are used instead.
@@ -61,7 +61,7 @@ pub enum LssEvent {
     AllSlavesChange(AnotherSlave),
     /// The slave lacks a service, so LSS cannot show that it is the only one.
     CannotExcludeOthers(UnansweredService),
-    /// Fastscan stopped after this device; there may be more.
+    /// Fastscan stopped after this device; there may be further devices.
     MoreUnconfigured {
         /// The device that was found last.
         last: LssAddress,
@@ -76,7 +76,7 @@ pub enum LssEvent {
 }
 
 impl LssEvent {
-    /// Whether the user should act on it: printed as a warning.
+    /// Whether the event is printed as a warning.
     pub fn is_warning(&self) -> bool {
         match self {
             LssEvent::Found { .. }
@@ -122,7 +122,7 @@ pub enum AnotherSlave {
     OtherSerial(u32),
     /// The slaves report different node-IDs.
     NodeIds,
-    /// LSS and SDO show different identities.
+    /// LSS and SDO report different identities.
     Identities {
         /// By SDO.
         by_sdo: LssAddress,
@@ -135,7 +135,7 @@ pub enum AnotherSlave {
 #[derive(Clone, Debug)]
 pub struct Reason(pub Arc<LssError>);
 
-/// Errors of the operating system cannot be compared, so the debug forms are.
+/// Compares the debug forms, because errors of the operating system have no comparison.
 impl PartialEq for Reason {
     fn eq(&self, other: &Reason) -> bool {
         format!("{:?}", self.0) == format!("{:?}", other.0)

@@ -17,7 +17,7 @@ use std::time::Duration;
 /// A node-ID or a bit rate was not set.
 #[derive(Clone, Debug)]
 pub struct LssFailure {
-    /// The device that it concerns.
+    /// The device.
     pub device: DeviceName,
     /// The cause.
     pub cause: LssCause,
@@ -34,7 +34,7 @@ pub enum LssCause {
     DuplicateNodeId(DuplicateSign),
     /// The node does not answer.
     NoAnswer(Duration),
-    /// By LSS the device with this identity has another node-ID, or none.
+    /// According to LSS, the device with this identity has another node-ID, or none.
     OtherNodeIdByLss(Option<NodeId>),
     /// Another node has the same identity.
     SameIdentity(NodeId),
@@ -42,25 +42,25 @@ pub enum LssCause {
     SeveralWithIdentity,
     /// More than one device is on the bus.
     NotTheOnly(AnotherSlave),
-    /// No device answers, neither by SDO nor by LSS.
+    /// No device answers by SDO or LSS.
     NoDevice,
     /// No device without a node-ID answers.
     NoUnconfigured,
     /// No slave has an identity in this range.
     NoneInRange(LssRange),
-    /// The slave supports no inquiry.
+    /// The slave does not support inquiries.
     NoInquiry,
     /// The new node-ID is in use.
     Taken(NodeId, TakenSign),
     /// The objects of this device are unknown.
     ObjectsUnknown,
-    /// SDO does not reach the device, or not only this one.
+    /// SDO does not reach the device, or reaches other devices, too.
     ObjectsOutOfReach,
     /// No object is known for this setting.
     NoObject(Setting),
     /// The object cannot hold the number.
     Number(ObjectId, String),
-    /// The objects take effect only if they are stored (this object), or store themselves (`None`).
+    /// The values take effect only if they are stored by this object; `None` if the write itself stores them.
     NeedsStore(Option<ObjectId>),
     /// The device does not have this bit rate.
     NoSuchRate {
@@ -75,9 +75,9 @@ pub enum LssCause {
         /// Whether the table is that of CiA 305.
         is_standard: bool,
     },
-    /// The codes that the objects of the device have for bit rates are unknown.
+    /// The bit rate codes of the device are unknown.
     RateCodesUnknown(Option<String>),
-    /// The device was not reset, so it was not seen under its new node-ID.
+    /// The device was not reset, so the new node-ID is not confirmed.
     NotReset(NodeId, NotReset),
     /// Another device answers under the new node-ID.
     OtherDeviceAnswers(LssAddress),
@@ -85,7 +85,7 @@ pub enum LssCause {
     NotIdentified,
     /// More than one device answers under the new node-ID.
     DuplicateNewNodeId(DuplicateSign),
-    /// The boot-up message came, and then no answer.
+    /// After the boot-up message, the device did not answer.
     SilentAfterBootUp(Duration),
     /// The device restarted under its old node-ID.
     StillOldNodeId {
@@ -94,11 +94,11 @@ pub enum LssCause {
         /// The new node-ID.
         new: NodeId,
     },
-    /// Neither a boot-up message nor an answer came from the new node-ID.
+    /// No boot-up message and no answer came from the new node-ID.
     NotSeen {
         /// The new node-ID.
         new: NodeId,
-        /// How long it was waited for.
+        /// The waiting time.
         waited: Duration,
     },
     /// The host cannot change its bit rate together with the device.
@@ -107,7 +107,7 @@ pub enum LssCause {
     NotAloneForRetime(Neighbour),
     /// The device does not answer at the new bit rate (in bit/s).
     SilentAtRate(u32),
-    /// The device stored the new bit rate, was reset, and does not answer at it.
+    /// The device stored the new bit rate and was reset, but does not answer at this bit rate.
     SilentAfterStore {
         /// The new bit rate in bit/s.
         bit_rate: u32,
@@ -132,7 +132,7 @@ pub enum Setting {
 pub enum NotReset {
     /// Another device has the same node-ID.
     SharedNodeId(NodeId),
-    /// Its present node-ID is unknown.
+    /// The present node-ID of the device is unknown.
     NodeIdUnknown,
 }
 
@@ -149,7 +149,7 @@ pub enum HostObstacle {
     AppliesAfterStore,
 }
 
-/// Something else on the bus.
+/// Another participant on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Neighbour {
     /// Another node.
@@ -160,14 +160,14 @@ pub enum Neighbour {
     Sender(CanId),
 }
 
-/// A change that was made before an LSS task failed, or a state that it left behind.
+/// A change before an LSS task failed, or the state after the failure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LssEffect {
-    /// How far the change has come.
+    /// The completed steps of the change.
     Progress(DeviceName, Progress, NextStep),
     /// The device may still be in configuration state.
     MayBeConfiguring,
-    /// The host is back at its old bit rate.
+    /// The host uses its old bit rate again.
     HostIsBack {
         /// The old bit rate in bit/s.
         bit_rate: u32,
@@ -178,21 +178,21 @@ pub enum LssEffect {
     },
 }
 
-/// The next step after a change that did not succeed completely.
+/// The next step after an incomplete change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NextStep {
     /// Follow the hint of the cause.
     Cause,
     /// Check the node-ID and bit rate of the device after a power cycle.
     SeeAfterPowerCycle,
-    /// Check after a power cycle whether it is stored, or store again.
+    /// Check after a power cycle whether the value is stored, or store again.
     StoreAgain,
     /// A power cycle discards values that are not stored.
     PowerCycle,
 }
 
 impl LssFailure {
-    /// A failure that concerns no single device.
+    /// A failure that does not belong to a single device.
     pub fn general(cause: LssCause) -> LssFailure {
         LssFailure { device: DeviceName::default(), cause }
     }

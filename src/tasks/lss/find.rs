@@ -1,4 +1,4 @@
-//! Lists the devices that can get a node-ID.
+//! Lists the devices whose node-ID can be set.
 
 use super::device::DeviceName;
 use super::event::{LssEvent, LssFact, Reason};
@@ -11,7 +11,7 @@ use crate::master::{Lss, LssError, Master};
 use crate::tasks::{Failure, Note};
 use std::sync::Arc;
 
-/// A device that can get a node-ID.
+/// A device whose node-ID can be set.
 #[derive(Clone, Debug)]
 pub struct FoundSlave {
     /// Its node-ID; `None` if it has none.
@@ -22,11 +22,11 @@ pub struct FoundSlave {
     pub model: Option<Arc<Model>>,
 }
 
-/// Lists the devices with a node-ID, found by SDO, and those without, found by fastscan. A device that fastscan found
-/// waits in configuration state while the next one is searched. Nothing is changed.
+/// Lists the devices with a node-ID (by SDO) and those without (by fastscan). A device found by fastscan stays in
+/// configuration state while the next one is searched. Nothing is changed.
 ///
 /// # Errors
-/// Bus errors and Ctrl-C; the first fastscan failed. If a later one fails, that is an event. If there is no device, the
+/// Bus errors and Ctrl-C; the first fastscan failed. The failure of a later fastscan is an event. Without a device, the
 /// list is empty.
 pub fn scan(master: &mut Master<'_>, notify: Notify<'_>) -> Result<Vec<FoundSlave>, Failure> {
     let mut slaves: Vec<FoundSlave> = nodes::identified(master)?
@@ -50,7 +50,7 @@ pub fn scan(master: &mut Master<'_>, notify: Notify<'_>) -> Result<Vec<FoundSlav
     Ok(slaves)
 }
 
-/// Finds devices without a node-ID until no more answers.
+/// Finds devices without a node-ID, until no further device answers.
 fn unconfigured(lss: &mut Lss<'_, '_>, notify: Notify<'_>) -> Result<Vec<LssAddress>, LssError> {
     let mut found: Vec<LssAddress> = Vec::new();
     loop {

@@ -1,4 +1,4 @@
-//! Which method sets node-ID and bit rate, and which index stands for the bit rate. Decided before anything is changed.
+//! Chooses the method to set node-ID and bit rate, and the index of the bit rate, before the first change.
 
 use super::device::LssDevice;
 use super::event::LssEvent;
@@ -10,7 +10,7 @@ use crate::device::description::Description;
 use crate::device::quirk::Quirk;
 use crate::tasks::Failure;
 
-/// A bit rate as the user requests it.
+/// A bit rate as requested by the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RequestedRate {
     /// In bit/s.
@@ -21,7 +21,7 @@ pub enum RequestedRate {
     Index(u8, Option<u32>),
 }
 
-/// A bit rate as the device takes it.
+/// A bit rate in the form of the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlannedRate {
     /// The index in the table of the device.
@@ -56,7 +56,7 @@ pub(super) fn choose_method(
         }
     };
     let mut entry = entry.unwrap_or_else(AssignEntry::lss);
-    // An unknown device may answer LSS in STOPPED only.
+    // An unknown device may answer LSS only in STOPPED.
     entry.retry_stopped |= description.is_none_or(|description| description.assign.is_empty());
     if entry.kind == AssignKind::Objects {
         check_objects(device, &entry, store, notify)?;
@@ -64,8 +64,7 @@ pub(super) fn choose_method(
     Ok(entry)
 }
 
-/// The objects to use if the device does not answer LSS: only if a document confirms them, and if they can be reached
-/// and stored.
+/// The objects to use if the device does not answer LSS. They must be confirmed by a document, reachable, and stored.
 pub(super) fn objects_instead(device: &LssDevice, store: bool) -> Option<AssignEntry> {
     let entry = device.description()?.assign_of_kind(AssignKind::Objects)?;
     let is_usable = !entry.unverified && device.own_node().is_some() && needs_store(entry, store).is_ok();

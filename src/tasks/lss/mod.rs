@@ -1,8 +1,8 @@
-//! Node-ID and bit rate: set by LSS (CiA 305), or through objects of the device.
+//! Sets node-ID and bit rate by LSS (CiA 305), or through objects of the device.
 //!
-//! Rules that all functions keep:
+//! Rules for all functions:
 //! - Nothing is changed before exactly one device is known to be addressed.
-//! - Every path out leaves the LSS configuration state.
+//! - Every exit path ends the LSS configuration state.
 //! - A node is reset only if the reset cannot reach another device.
 //! - Success is proven by the device under its new node-ID, not by its acknowledgement.
 //!
@@ -48,7 +48,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
-/// The device that a command names.
+/// The device given to a command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Target {
     /// The device with this node-ID. Its identity is read first, then it is addressed by the identity.
@@ -92,7 +92,7 @@ impl fmt::Display for Target {
     }
 }
 
-/// How node-ID and bit rate are set.
+/// The method to set node-ID and bit rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Via {
     /// By the method that the description of the device prefers, else by LSS.

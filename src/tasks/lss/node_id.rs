@@ -1,4 +1,4 @@
-//! Counts the devices that answer under a node-ID: none, one or several.
+//! Counts the devices that answer at a node-ID: none, one or several.
 
 use super::device::DeviceName;
 use super::failure::{LssCause, LssFailure};
@@ -16,7 +16,7 @@ use std::time::Duration;
 
 const IDENTITY: u16 = 0x1018;
 
-/// How often an identity is read. The answers of two devices can merge on the wire once, but not each time.
+/// The number of reads of an identity. The answers of two devices can merge on the bus once, but not every time.
 const IDENTITY_READS: usize = 3;
 
 /// The wait for a second answer after an identity was read.
@@ -50,12 +50,12 @@ pub enum TakenSign {
     Heartbeat,
 }
 
-/// The devices that answer under a node-ID.
+/// The devices that answer at a node-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Occupant {
     /// One device with this identity.
     Device(LssAddress),
-    /// As far as is known one device. It has no serial number, so it cannot be distinguished from others.
+    /// Probably one device. It has no serial number, so it cannot be distinguished from others.
     Unidentified,
     /// Several devices.
     Several(DuplicateSign),
@@ -63,8 +63,8 @@ pub(super) enum Occupant {
     None(Duration),
 }
 
-/// Reads the identity (1018h) of a node several times, and looks for evidence of two devices: answers that arrive
-/// twice, differ or collide.
+/// Reads the identity (1018h) of a node several times, and checks for two devices: answers that arrive twice, differ or
+/// collide.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C; an answer that violates the protocol.
@@ -122,7 +122,7 @@ impl SdoMonitor {
     }
 
     fn sign(&self, master: &Master<'_>) -> Option<DuplicateSign> {
-        // The master knows which frames are answers to other masters or late ones.
+        // The master recognises late answers and answers to other masters.
         let has_second_answer = || master.second_answers().iter().any(|(node, _)| *node == self.node);
         match self {
             SdoMonitor { has_other_master: true, .. } => Some(DuplicateSign::OtherMaster),
@@ -217,7 +217,7 @@ pub(super) fn taken(master: &mut Master<'_>, node: NodeId) -> Result<Option<Take
     Ok(sign)
 }
 
-/// The identity of the only device under a node-ID.
+/// The identity of the only device with a node-ID.
 ///
 /// # Errors
 /// No device, more than one, or a device without a serial number; bus errors and Ctrl-C.

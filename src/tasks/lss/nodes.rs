@@ -13,7 +13,7 @@ use std::time::Duration;
 /// The wait for answers after the last request of an SDO scan.
 const SCAN_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// How often a silent node is asked.
+/// The number of requests to a silent node.
 const SCAN_ROUNDS: u32 = 2;
 
 /// Every node that answers, with its identity.
@@ -55,8 +55,8 @@ pub(super) fn with_identity(master: &mut Master<'_>, address: LssAddress) -> Res
     Ok(found.iter().filter(|found| address_of(&found.device) == Some(address)).map(|found| found.node).collect())
 }
 
-/// Refuses an identity that another node has as well: LSS would address both. Some vendors give all devices the same
-/// serial number.
+/// Rejects an identity that another node also has, because LSS would address both. Some vendors give all devices the
+/// same serial number.
 ///
 /// # Errors
 /// [`LssCause::SameIdentity`]; bus errors and Ctrl-C.

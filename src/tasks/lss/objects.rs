@@ -22,8 +22,8 @@ type Write = Option<(AssignObject, u8)>;
 /// Writes the values of `progress` to the objects of the method, and stores them.
 ///
 /// # Errors
-/// The device rejects a write or does not answer. Values that are not stored are set back if the previous ones could be
-/// read.
+/// The device rejects a write or does not answer. Values that are not stored are restored if the previous values could
+/// be read.
 pub(super) fn by_objects(
     master: &mut Master<'_>,
     device: &LssDevice,
@@ -32,7 +32,7 @@ pub(super) fn by_objects(
     progress: &mut Progress,
 ) -> Result<(), Failure> {
     let Some(id) = device.node else { return Err(device.failure(LssCause::ObjectsOutOfReach)) };
-    // Both of two devices with this node-ID would be changed.
+    // Otherwise, two devices with this node-ID would both be changed.
     master.set_on_two_devices(OnTwoDevices::RefuseWrites);
     let node = device.as_node(id);
     let object = |object, setting| object_for(device, object, setting);
@@ -48,7 +48,7 @@ pub(super) fn by_objects(
     let old_id = previous(master, id, new_id)?;
     let old_rate = previous(master, id, new_rate)?;
     let result = write_all(master, device, &node, method.store.filter(|_| store), (new_id, new_rate), progress);
-    // A method without a store object stores by itself.
+    // A method without a store object stores the values by itself.
     if result.is_ok() && method.store.is_none() {
         progress.stored = Stage::Done;
     }
@@ -110,8 +110,8 @@ fn write_bytes(
     result.map(|_| ()).map_err(Failure::from)
 }
 
-/// The number that an object holds: its lowest byte. `None` if the device does not return it: then it cannot be set
-/// back.
+/// The number in an object: its lowest byte. `None` if the device does not return it; the number then cannot be
+/// restored.
 fn previous(master: &mut Master<'_>, node: NodeId, write: Write) -> Result<Write, Error> {
     let Some((object, _)) = write else { return Ok(None) };
     let answer = master.transfer_one(Request::read(node, object.object))?;
@@ -119,7 +119,7 @@ fn previous(master: &mut Master<'_>, node: NodeId, write: Write) -> Result<Write
     Ok(uploaded.and_then(|uploaded| uploaded.bytes.first().map(|&number| (object, number))))
 }
 
-/// Writes the previous numbers to the objects that may hold the new ones.
+/// Writes the previous numbers to the objects that may contain the new ones.
 fn revert(
     master: &mut Master<'_>,
     device: &LssDevice,

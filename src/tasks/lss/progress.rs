@@ -1,10 +1,10 @@
-//! How far a change has come.
+//! The progress of a change.
 
 use super::method::PlannedRate;
 use crate::canopen::id::NodeId;
 use crate::master::LssError;
 
-/// How far one step has come.
+/// The state of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stage {
     /// Not sent, or rejected.
@@ -14,7 +14,7 @@ pub enum Stage {
     Sent,
     /// Acknowledged.
     Done,
-    /// Set back to the previous value.
+    /// Restored to the previous value.
     Reverted,
 }
 
@@ -28,18 +28,18 @@ impl Stage {
         }
     }
 
-    /// Whether the device may hold the new value.
+    /// Whether the device may have the new value.
     pub(super) fn may_hold(self) -> bool {
         matches!(self, Stage::Sent | Stage::Done)
     }
 }
 
-/// How far a change of node-ID and bit rate has come.
+/// The progress of a change of node-ID and bit rate.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
-    /// The new node-ID, if one is to be set.
+    /// The new node-ID, if requested.
     pub id: Option<(NodeId, Stage)>,
-    /// The new bit rate, if one is to be set.
+    /// The new bit rate, if requested.
     pub rate: Option<(PlannedRate, Stage)>,
     /// Whether both are stored.
     pub stored: Stage,
@@ -48,7 +48,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Before the first step.
+    /// The progress before the first step.
     pub(super) fn new(id: Option<NodeId>, rate: Option<PlannedRate>) -> Progress {
         Progress {
             id: id.map(|id| (id, Stage::NotDone)),
@@ -61,17 +61,17 @@ impl Progress {
         self.id.iter().map(|(_, stage)| *stage).chain(self.rate.iter().map(|(_, stage)| *stage))
     }
 
-    /// Whether the device may hold a new value that is not stored.
+    /// Whether the device may have a new value that is not stored.
     pub(super) fn is_pending(&self) -> bool {
         self.stored == Stage::NotDone && self.stages().any(Stage::may_hold)
     }
 
-    /// Whether the device certainly is as it was before.
+    /// Whether the device is certainly unchanged.
     pub(super) fn is_unchanged(&self) -> bool {
         self.stored == Stage::NotDone && !self.is_retimed && !self.stages().any(Stage::may_hold)
     }
 
-    /// Records a step with the bit rate.
+    /// Records a step of the bit rate.
     pub(super) fn set_rate(&mut self, stage: Stage) {
         if let Some((_, of_rate)) = &mut self.rate {
             *of_rate = stage;

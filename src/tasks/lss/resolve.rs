@@ -1,4 +1,4 @@
-//! Finds the device that an argument names: its identity, its node-ID, and how LSS reaches it.
+//! Finds the device of an argument: its identity, its node-ID, and its address for LSS.
 
 use super::device::{Descriptions, LssDevice};
 use super::event::LssEvent;
@@ -12,11 +12,11 @@ use crate::canopen::lss::LssAddress;
 use crate::master::{LssError, Master, OnTwoDevices};
 use crate::tasks::Failure;
 
-/// Finds the device of a target. Nothing is changed, and the configuration state is left again. `force` is for
-/// [`Target::Only`].
+/// Finds the device of a target. Nothing is changed, and the device is switched back to waiting state.
+/// `force` is for [`Target::Only`].
 ///
 /// # Errors
-/// No device, more than one, or one that cannot be distinguished from others; bus errors and Ctrl-C.
+/// No device, several devices, or a device that cannot be distinguished from others; bus errors and Ctrl-C.
 pub(super) fn resolve(
     master: &mut Master<'_>,
     target: &Target,
@@ -57,10 +57,11 @@ fn by_address(
     descriptions: &Descriptions<'_>,
     notify: Notify<'_>,
 ) -> Result<LssDevice, Failure> {
-    // LSS reaches one of two devices with one node-ID, so this target is the way to separate them.
+    // With this target, LSS addresses only one of two devices with the same node-ID. So it can be used to separate
+    // them.
     master.set_on_two_devices(OnTwoDevices::Report);
     let mut device = LssDevice::with_address(address);
-    // A device that requires another NMT state does not answer LSS here. SDO may show it.
+    // A device that requires another NMT state does not answer LSS here, but may answer SDO.
     let by_lss = inquire_node_id(master, &device)?;
     match by_lss {
         LssNodeId::Known(Some(node)) => device.node = Some(node),
@@ -75,7 +76,7 @@ fn by_address(
         match occupant(master, node)? {
             Occupant::Device(found) if found == address => device.is_alone = true,
             Occupant::Device(_) | Occupant::Several(_) => notify(device.note(LssEvent::SharedNodeId(node))),
-            // It answers LSS but not SDO: it is stopped. No other device answers under its node-ID.
+            // The device answers LSS but not SDO, so it is stopped. No other device answers at its node-ID.
             Occupant::None(_) => is_stopped = matches!(by_lss, LssNodeId::Known(_)),
             Occupant::Unidentified => {}
         }
@@ -107,11 +108,11 @@ fn unconfigured(master: &mut Master<'_>, descriptions: &Descriptions<'_>) -> Res
 
 /// The node-ID that a device reports by LSS.
 enum LssNodeId {
-    /// `None` if it has none.
+    /// The node-ID; `None` if the device has none.
     Known(Option<NodeId>),
     /// The device does not support the service (5Eh).
     NotSupported,
-    /// The device does not answer to its identity. Some devices answer in one NMT state only.
+    /// The device does not answer to its identity. Some devices answer only in one NMT state.
     Silent(Box<Failure>),
 }
 

@@ -1,5 +1,5 @@
-//! Changes the bit rate of device and host together. By LSS nothing is stored before the device answers at the new bit
-//! rate, so a power cycle returns it to the old one.
+//! Changes the bit rate of device and host together. With LSS, nothing is stored before the device answers at the new
+//! bit rate. A power cycle then restores the old bit rate.
 
 use super::Notify;
 use super::assign::Job;
@@ -28,13 +28,13 @@ use std::time::Duration;
 const DELAY_MS: u16 = 1000;
 const DELAY: Duration = Duration::from_millis(DELAY_MS as u64);
 
-/// The time that clocks and the interface take in addition.
+/// Additional time for clocks and the interface.
 const MARGIN: Duration = Duration::from_millis(50);
 
 /// How long a device is searched at a bit rate.
 const SEARCH_TIME: Duration = Duration::from_secs(4);
 
-/// Whether the device changes to a bit rate that is not the host's, or may do so.
+/// Whether the device may change to a bit rate different from that of the host.
 pub(super) fn leaves_host(master: &Master<'_>, rate: Option<PlannedRate>) -> bool {
     rate.is_some_and(|rate| rate.bits.is_none() || rate.bits != master.bus().bit_rate())
 }
@@ -45,9 +45,9 @@ pub(super) struct Retiming<'a> {
     device: &'a LssDevice,
     method: &'a AssignEntry,
     index: u8,
-    /// In bit/s.
+    /// The bit rate in bit/s.
     old: u32,
-    /// In bit/s.
+    /// The bit rate in bit/s.
     new: u32,
 }
 
@@ -78,11 +78,11 @@ impl<'a> Retiming<'a> {
         Ok(Retiming { job, device, method, index: rate.index, old, new })
     }
 
-    /// Changes device and host to the new bit rate. Returns whether the job is complete: a device that must store first
-    /// stores the node-ID as well.
+    /// Changes device and host to the new bit rate. Returns whether the job is complete. A device that must store the
+    /// bit rate first also stores the node-ID.
     ///
     /// # Errors
-    /// The device does not answer at the new bit rate. The host is then back at the old one.
+    /// The device does not answer at the new bit rate. The host then uses the old bit rate again.
     pub(super) fn carry_out(
         &self,
         master: &mut Master<'_>,
@@ -128,7 +128,7 @@ impl<'a> Retiming<'a> {
         stored
     }
 
-    /// Stores the new bit rate. The device keeps it until a power cycle in any case.
+    /// Stores the new bit rate. Without a store, the device uses it until a power cycle.
     fn store(&self, master: &mut Master<'_>, progress: &mut Progress) -> Result<(), Failure> {
         configured(master, self.device, |lss| {
             let result = lss.store();
@@ -138,7 +138,7 @@ impl<'a> Retiming<'a> {
         .map(|_| ())
     }
 
-    /// Changes the host to the new bit rate and searches the device there.
+    /// Changes the host to the new bit rate and searches the device.
     fn follow(&self, master: &mut Master<'_>, start: Mono) -> Result<(), Failure> {
         // No node acknowledges frames at a wrong bit rate.
         master.set_tolerates_outages(true);
@@ -151,7 +151,7 @@ impl<'a> Retiming<'a> {
         Err(self.device.failure(LssCause::SilentAtRate(self.new)))
     }
 
-    /// Returns the host to the old bit rate, and searches the device there.
+    /// Changes the host back to the old bit rate, and searches the device.
     fn go_back(
         &self,
         master: &mut Master<'_>,
@@ -168,7 +168,7 @@ impl<'a> Retiming<'a> {
             failure.effects.push(Effect::InterfaceNotRestored { interface, bit_rate, reason: error.to_string() });
             return failure;
         }
-        // Before this moment the device may still be about to change. A second Ctrl-C ends the wait.
+        // Before this moment the device may still change its bit rate. A second Ctrl-C ends the wait.
         let _ = pause(master, start + DELAY * 2 + MARGIN, Policy::Reconnect);
         let device_answers = matches!(answers(master, device, device.node), Ok(true));
         if device_answers {
@@ -190,7 +190,7 @@ impl<'a> Retiming<'a> {
         failure
     }
 
-    /// For devices that must store before they use the new bit rate.
+    /// Changes the bit rate of a device that uses it only after a store.
     fn by_storing(&self, master: &mut Master<'_>, progress: &mut Progress, notify: Notify<'_>) -> Result<(), Failure> {
         let device = self.device;
         notify(device.note(LssEvent::NoReturn { bit_rate: self.new }));
@@ -216,7 +216,7 @@ impl<'a> Retiming<'a> {
     }
 }
 
-/// Refuses if another device is on the bus: it would stay at the old bit rate, and be disturbed by the new one.
+/// Fails if another device is on the bus, because it would stay at the old bit rate and be disturbed.
 fn check_alone(master: &mut Master<'_>, device: &LssDevice) -> Result<(), Failure> {
     let refuse = |neighbour| device.failure(LssCause::NotAloneForRetime(neighbour));
     if let Some(other) = nodes::on_bus(master)?.into_iter().find(|&node| device.node != Some(node)) {
@@ -271,7 +271,7 @@ fn answers(master: &mut Master<'_>, device: &LssDevice, node: Option<NodeId>) ->
     }
 }
 
-/// Whether the device answers SDO. A stopped device does not, so then LSS counts.
+/// Whether the device answers SDO. A stopped device does not, so its LSS answer is used.
 fn answers_now(master: &mut Master<'_>, device: &LssDevice, node: Option<NodeId>) -> Result<bool, Failure> {
     if let Some(node) = node {
         match occupant(master, node)? {

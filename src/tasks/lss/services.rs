@@ -67,8 +67,9 @@ pub fn store(
     with_device(master, &device, notify, |lss| accepted_by_all(lss.store(), force))
 }
 
-/// Activates the configured bit rate: the slave is silent for `delay_ms`, changes the bit rate, and is silent for the
-/// same time again. `None` addresses all slaves. Slaves do not acknowledge it.
+/// Activates the configured bit rate: the slave is silent for
+/// `delay_ms`, changes the bit rate, and is silent for the same time again. `None` addresses all slaves. Slaves do not
+/// acknowledge the request.
 ///
 /// # Errors
 /// As [`super::assign`].
@@ -105,13 +106,13 @@ fn with_device<T>(
     Ok(session.result)
 }
 
-/// The failure of a task that had changed nothing.
+/// The failure of a task before any change.
 pub(super) fn unchanged(mut failure: Failure) -> Failure {
     failure.effects.push(Effect::NothingChanged);
     failure
 }
 
-/// With `force` it is a success if several slaves accept the request.
+/// With `force`, several answers that accept the request are a success.
 pub(super) fn accepted_by_all(result: Result<(), LssError>, force: bool) -> Result<(), LssError> {
     match result {
         Err(LssError::Several { frames, .. })

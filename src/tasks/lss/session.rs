@@ -1,4 +1,4 @@
-//! LSS configuration state: how a device gets there, in which NMT state, and that it leaves it again.
+//! Switches a device to LSS configuration state and back, in the required NMT state.
 
 use super::Notify;
 use super::device::{LssDevice, Reach};
@@ -18,7 +18,8 @@ use std::collections::BTreeSet;
 pub(super) struct Session<T> {
     /// The result.
     pub result: T,
-    /// The nodes that booted meanwhile. A device without a node-ID boots when it leaves configuration state with one.
+    /// The nodes that booted during the work. A device without a node-ID boots when it leaves configuration state with
+    /// a new node-ID.
     pub booted: BTreeSet<NodeId>,
     /// The NMT state to restore.
     pub previous_state: Option<PreviousState>,
@@ -58,7 +59,7 @@ pub(super) struct PreviousState {
     changed_to: AssignState,
 }
 
-/// Puts the device into the NMT state that the method requires. Without a requirement, or if the command would reach
+/// Switches the device to the NMT state that the method requires. Without a requirement, or if the command would reach
 /// another device, nothing is sent.
 ///
 /// # Errors
@@ -74,13 +75,13 @@ pub(super) fn enter_state(
         AssignState::PreOperational => (NmtCommand::EnterPreOperational, NmtState::PreOperational),
         AssignState::Stopped => (NmtCommand::Stop, NmtState::Stopped),
     };
-    // Sent in any case, as the manuals print it.
+    // Sent even if the state is already right, as in the manuals.
     master.send(command.frame(Some(node)));
     Ok(Some(PreviousState { node, state, changed_to: required }).filter(|_| state != Some(target)))
 }
 
-/// Restores the NMT state that [`enter_state`] changed, if it was known. A stopped device has no SDO, so a device of
-/// unknown state is not left in STOPPED.
+/// Restores the NMT state that [`enter_state`] changed, if it was known. A stopped device does not answer SDO, so a
+/// device of unknown state is not left in STOPPED.
 pub(super) fn restore_state(
     master: &mut Master<'_>,
     device: &LssDevice,
@@ -105,8 +106,8 @@ pub(super) fn restore_state(
     }
 }
 
-/// Works in configuration state and in the NMT state that the method requires. If the device does not answer LSS and the
-/// method allows it, the work is done again in STOPPED.
+/// Works in configuration state and in the NMT state that the method requires. If the device does not answer LSS and
+/// the method allows it, the work is repeated in STOPPED.
 ///
 /// On success the caller restores the NMT state; on failure it is restored here.
 ///
@@ -138,8 +139,8 @@ pub(super) fn prepared<T>(
     }
 }
 
-/// Whether a failure means that the device does not answer LSS at all. A global switch is not answered, so there the
-/// first service counts.
+/// Whether a failure means that the device does not answer LSS at all. A global switch has no answer, so the first
+/// service after it decides.
 pub(super) fn is_silent(device: &LssDevice, failure: &Failure) -> bool {
     let Cause::Lss(cause) = &failure.cause else { return false };
     let LssCause::Service(error) = &cause.cause else { return false };

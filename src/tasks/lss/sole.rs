@@ -1,4 +1,4 @@
-//! The only device on the bus. Everything that can show a second device is asked first.
+//! Finds the only device on the bus. First, all services that can show a second device are used.
 
 use super::Notify;
 use super::device::{Descriptions, LssDevice, Reach};
@@ -13,15 +13,15 @@ use crate::master::lss::{Gathered, Others};
 use crate::master::{Lss, LssError, Master};
 use crate::tasks::Failure;
 
-/// The answers of the slaves if all of them are asked at once.
+/// The answers to requests to all slaves.
 #[derive(Default)]
 struct SlaveAnswers {
     address: Option<LssAddress>,
-    /// `Some(None)` for a slave without a node-ID.
+    /// The node-ID; `Some(None)` for a slave without a node-ID.
     node: Option<Option<NodeId>>,
     /// The evidence of more than one slave.
     another: Option<AnotherSlave>,
-    /// The slave does not answer the question for others (46h to 4Bh).
+    /// Whether the slave does not answer the identification of others (46h to 4Bh).
     is_unproven: bool,
 }
 
@@ -71,7 +71,7 @@ pub(super) fn sole_device(
     Ok(device)
 }
 
-/// The only device as far as SDO shows it, and the evidence of another one.
+/// The only device found by SDO, and evidence of another one.
 fn by_sdo(master: &mut Master<'_>) -> Result<(LssDevice, Option<AnotherSlave>), Failure> {
     let nodes = nodes::on_bus(master)?;
     let (node, mut another) = match nodes[..] {
@@ -91,7 +91,7 @@ fn by_sdo(master: &mut Master<'_>) -> Result<(LssDevice, Option<AnotherSlave>), 
     Ok((LssDevice { address, node, is_unconfigured: false, is_alone, model: None, reach: Reach::Global }, another))
 }
 
-/// Asks all slaves at once. `known` is the identity by SDO, for slaves that do not answer inquiries.
+/// Sends requests to all slaves. `known` is the identity by SDO, for slaves that do not answer inquiries.
 fn ask_all(lss: &mut Lss<'_, '_>, known: Option<LssAddress>) -> Result<SlaveAnswers, LssError> {
     let several = |another| Ok(SlaveAnswers { another: Some(another), ..SlaveAnswers::default() });
     let mut numbers = Vec::new();
@@ -105,7 +105,8 @@ fn ask_all(lss: &mut Lss<'_, '_>, known: Option<LssAddress>) -> Result<SlaveAnsw
     }
     let address = <[u32; 4]>::try_from(numbers).ok().map(LssAddress::new);
     let mut answers = SlaveAnswers { address, ..SlaveAnswers::default() };
-    // Equal answers merge on the wire, different ones collide. So slaves with other numbers are asked for one by one.
+    // Equal answers merge on the bus, different ones collide. So slaves with other numbers are searched by
+    // identification.
     if let Some(address) = address.or(known) {
         match lss.others(&address)? {
             Others::None => {}
@@ -127,7 +128,7 @@ fn ask_all(lss: &mut Lss<'_, '_>, known: Option<LssAddress>) -> Result<SlaveAnsw
     Ok(answers)
 }
 
-/// `None` if no slave answers: not every slave supports every service.
+/// Returns `None` if no slave answers, because not every slave supports every service.
 fn unless_silent<T>(gathered: Result<Gathered<T>, LssError>) -> Result<Option<Gathered<T>>, LssError> {
     match gathered {
         Ok(gathered) => Ok(Some(gathered)),

@@ -18,11 +18,11 @@ pub enum NmtFailure {
     NoSign,
     /// No boot-up message came after a reset.
     NoBootUp,
-    /// Nothing confirms the state.
+    /// The state could not be confirmed.
     NotConfirmed,
     /// The node sends no heartbeat and does not answer SDO requests.
     Absent,
-    /// A temporary write could not be recorded in the journal. It was not sent.
+    /// A temporary write could not be recorded in the journal, so it was not sent.
     NotRecorded(JournalError),
     /// The object that decides how the device starts is not in the description.
     NoStartupObject,

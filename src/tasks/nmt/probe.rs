@@ -1,4 +1,4 @@
-//! Finds out a state by switching on the heartbeat briefly.
+//! Reads the state of a node by switching on its heartbeat for a short time.
 
 use crate::canopen::value::DataType;
 use crate::master::{Error as MasterError, Master, SdoError, SdoFailure};
@@ -14,13 +14,13 @@ use std::time::Duration;
 /// The heartbeat time during the probe.
 const PROBE_PERIOD: Duration = Duration::from_millis(100);
 
-/// How many further Ctrl-C are ignored until 1017h is restored.
+/// The number of further Ctrl-C that are ignored until 1017h is restored.
 const MAX_INTERRUPTS: u32 = 5;
 
 /// The result of a probe.
 #[derive(Debug)]
 pub struct Probe {
-    /// The state, if it was found out.
+    /// The state, if it was received.
     pub report: StateReport,
     /// Why the probe failed.
     pub failure: Option<Failure>,
@@ -35,11 +35,11 @@ pub struct LeftHeartbeat {
     pub milliseconds: u16,
     /// The time before the probe in milliseconds.
     pub before: u16,
-    /// Whether the node acknowledged it; otherwise it may hold either time.
+    /// Whether the node acknowledged the time; otherwise 1017h may have either value.
     pub is_certain: bool,
 }
 
-/// Sets 1017h of a node, waits for a heartbeat and restores 1017h in every case.
+/// Sets 1017h of a node, waits for a heartbeat, and always restores 1017h.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C. A rejection or a missing answer of the node is in the result.
@@ -84,7 +84,7 @@ pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) ->
     Ok(Probe { report, failure, left })
 }
 
-/// Writes the old heartbeat time, also after Ctrl-C.
+/// Writes the old heartbeat time, even after Ctrl-C.
 fn restore(master: &mut Master<'_>, node: &Node, before: u16) -> Result<Written, Error> {
     let mut result = write(master, node, HEARTBEAT_TIME, &before.to_le_bytes());
     for _ in 0..MAX_INTERRUPTS {

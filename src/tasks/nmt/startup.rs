@@ -1,4 +1,4 @@
-//! How a device starts after power on: by the master, or by itself (1F80h, or an object of the device).
+//! Shows or sets how a device starts after power-on: by the master or by itself (1F80h, or an object of the device).
 
 use super::NmtFailure;
 use crate::canopen::id::NodeId;
@@ -13,33 +13,33 @@ use crate::tasks::Failure;
 /// How the device starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Starts {
-    /// It waits in PRE-OPERATIONAL for the master.
+    /// The device waits in PRE-OPERATIONAL for the master.
     Wait,
-    /// It goes to OPERATIONAL by itself.
+    /// The device changes to OPERATIONAL by itself.
     Auto,
-    /// A number that its description does not explain.
+    /// A number that the description does not explain.
     Other(u64),
 }
 
-/// How a device is set to start.
+/// The start-up setting of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StartupReport {
     /// The node.
     pub node: NodeId,
     /// The object that was read.
     pub object: ObjectId,
-    /// How it starts.
+    /// How the device starts.
     pub starts: Starts,
     /// The number in the object.
     pub raw: u64,
-    /// The doubt: the manual contradicts itself or leaves it open.
+    /// The doubt, if the manual is contradictory or incomplete.
     pub doubt: String,
 }
 
-/// Reads how a device starts. With `set` it is set first and read back.
+/// Reads how a device starts. With `set`, the setting is written first and read back.
 ///
 /// # Errors
-/// [`NmtFailure::NoStartupObject`]; a transfer that failed, an object that reads differently, bus errors and Ctrl-C.
+/// [`NmtFailure::NoStartupObject`]; a failed transfer, a value that differs when read back, bus errors and Ctrl-C.
 pub fn startup(
     master: &mut Master<'_>,
     node: NodeId,

@@ -15,11 +15,11 @@ use std::time::Duration;
 /// A change of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// The first heartbeat, or one with another state.
+    /// The first heartbeat, or a heartbeat with another state.
     State(NmtState),
     /// The node started.
     BootUp,
-    /// No heartbeat came for twice the heartbeat time; the time since the last one.
+    /// No heartbeat came for twice the heartbeat time. The value is the time since the last one.
     Lost(Duration),
     /// The heartbeat is back, with this state.
     Back(NmtState),
@@ -36,12 +36,12 @@ pub struct StateEvent {
     pub change: Change,
 }
 
-/// How much later than twice the heartbeat time a heartbeat may come.
+/// The additional delay of a heartbeat that is tolerated.
 const LATE_TOLERANCE: Duration = Duration::from_millis(50);
 
 /// Follows nodes until `until`, until Ctrl-C, or until `on_change` breaks.
 ///
-/// With `ask` the heartbeat time is read from 1017h; otherwise it is the longest interval that was seen.
+/// With `ask`, the heartbeat time is read from 1017h; otherwise it is the longest interval so far.
 ///
 /// # Errors
 /// Bus errors.
@@ -117,7 +117,7 @@ impl Waiter for Watcher<'_> {
 struct Heartbeat {
     state: Option<NmtState>,
     last: Option<Mono>,
-    /// From 1017h, or the longest interval seen.
+    /// The heartbeat time from 1017h, or the longest interval so far.
     period: Option<Duration>,
     is_lost: bool,
 }

@@ -1,4 +1,4 @@
-//! A change from the old settings to the requested ones, and back if a step fails.
+//! Changes the old settings to the requested ones, and restores the old ones if a step fails.
 
 use super::failure::{Incomplete, PdoEffect, PdoFact, PdoFailure, StepError, StepWrite};
 use super::plan;
@@ -16,7 +16,7 @@ use std::time::Duration;
 /// The longest wait for a device that restarts.
 const BOOT_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// How many times Ctrl-C is ignored while the old settings are restored. Each costs one exchange.
+/// The number of Ctrl-C that are ignored while the old settings are restored. Each one costs one exchange.
 const MAX_INTERRUPTS: u32 = 5;
 
 /// A change in progress.
@@ -46,10 +46,10 @@ enum Restored {
 }
 
 impl Change<'_, '_> {
-    /// Makes the change, or restores the old settings.
+    /// Carries out the change, or restores the old settings.
     ///
     /// # Errors
-    /// The step that failed, with the settings and the state that are left.
+    /// The failed step, with the present settings and state.
     pub(super) fn run(&mut self) -> Result<(), Failure> {
         if let Err(error) = self.attempt() {
             self.undo(&error)?;
@@ -106,8 +106,8 @@ impl Change<'_, '_> {
         StepWrite::new(self.old.number.communication(1), self.old.cob_id.switched_off().0, 4)
     }
 
-    /// Whether the change can go on although the device rejected bit 31. Some devices do not know bit 31 and accept a new
-    /// mapping without it. Not if the device has bit 31 according to its description.
+    /// Whether the change can continue although the device rejected bit 31. Some devices do not support bit 31 and
+    /// accept a new mapping without it. Not allowed if the description contains bit 31.
     fn may_stay_on(&self, error: &SdoError) -> bool {
         let is_unknown_bit = matches!(
             error.failure,
@@ -116,7 +116,8 @@ impl Change<'_, '_> {
         is_unknown_bit && (!self.is_described || self.remap == Remap::CountOnly)
     }
 
-    /// Carries out one write. If the device rejects it because of its state, it is set to PRE-OPERATIONAL once.
+    /// Carries out one write. If the device rejects the write because of its NMT state, the node is set to
+    /// PRE-OPERATIONAL once.
     fn step(&mut self, write: &StepWrite) -> Result<(), StepError> {
         self.current = Some(write.clone());
         match self.session.write(write) {
@@ -142,14 +143,15 @@ impl Change<'_, '_> {
         }
     }
 
-    /// Restores the old settings after an error. Succeeds if the device turns out to have all requested settings.
+    /// Restores the old settings after an error. If the device has all requested settings in spite of the error, this
+    /// is a success.
     fn undo(&mut self, error: &StepError) -> Result<(), Failure> {
         self.failed_at = self.current.take();
         let (mut interrupts_left, mut has_waited) = (MAX_INTERRUPTS, false);
         let last = loop {
             match self.restore(error) {
                 Ok(Restored::New) => {
-                    // A lost answer, and Ctrl-C after the last step, are not worth a note.
+                    // No note is needed for a lost answer, or for Ctrl-C after the last step.
                     if matches!(error, StepError::Rejected(_) | StepError::Restarted | StepError::NotKept { .. }) {
                         let (error, write) = (error.clone(), self.failed_at.clone());
                         self.note(PdoFact::SetDespite { number: self.old.number, error, write });
@@ -168,7 +170,8 @@ impl Change<'_, '_> {
                 Err(StepError::Interrupted) if interrupts_left > 0 => interrupts_left -= 1,
                 Err(last @ (StepError::Lost(_) | StepError::Restarted)) if !has_waited => {
                     has_waited = true;
-                    // Tried again even without a sign of life: most devices without heartbeat need this time to boot.
+                    // Repeated even without a sign of life, because devices without heartbeat also need this time to
+                    // boot.
                     if !self.session.has_restarted && self.session.wait_for_life(BOOT_TIMEOUT).is_err() {
                         break last;
                     }
@@ -248,7 +251,7 @@ impl Change<'_, '_> {
         self.failure(error).with(self.session.node.id, PdoEffect::Incomplete(Box::new(incomplete)))
     }
 
-    /// Notes when the TPDO is sent with the new settings, if that may be unexpected.
+    /// Adds notes about unexpected consequences: when the TPDO is sent with the new settings.
     fn note_consequences(&mut self) {
         let Settings { number, event_timer_ms, .. } = self.wanted;
         let transmission = self.wanted.transmission();

@@ -44,7 +44,7 @@ pub enum PdoFailure {
         /// Its mapping.
         mapping: Vec<MappingEntry>,
     },
-    /// The CAN identifier is used for something else.
+    /// The CAN identifier is already in use.
     Occupied {
         /// The identifier.
         id: CanId,
@@ -56,11 +56,11 @@ pub enum PdoFailure {
         /// The identifier.
         id: CanId,
     },
-    /// The TPDO has no identifier that it could be switched on with.
+    /// The TPDO has no valid identifier, so it cannot be switched on.
     NoIdentifier {
         /// The TPDO.
         number: TpdoNumber,
-        /// Its identifier.
+        /// The present identifier.
         id: CanId,
     },
     /// The TPDO does not have this parameter.
@@ -93,9 +93,9 @@ pub enum PdoFailure {
     Change {
         /// The reason.
         error: StepError,
-        /// The write at which it failed.
+        /// The failed write.
         write: Option<StepWrite>,
-        /// The entries that the device can map, if it rejected one.
+        /// The entries that the device can map, if it rejected an entry.
         mappable: Vec<MappingEntry>,
     },
     /// No TPDO of the nodes was received.
@@ -171,7 +171,7 @@ pub enum StepError {
     Interrupted,
     /// The bus failed.
     Bus(Arc<BusError>),
-    /// The device acknowledged a write and kept another value.
+    /// The device acknowledged a write, but has another value.
     NotKept {
         /// The object.
         object: ObjectId,
@@ -194,7 +194,7 @@ impl StepError {
         }
     }
 
-    /// The object, if the step failed at one.
+    /// The object of the failed step, if any.
     pub fn object(&self) -> Option<ObjectId> {
         match self {
             StepError::Rejected(error) | StepError::Lost(error) => Some(error.object),
@@ -212,7 +212,7 @@ impl StepError {
     }
 }
 
-/// Bus errors cannot be compared, so the debug form is.
+/// Compares the debug forms, because bus errors have no comparison.
 impl PartialEq for StepError {
     fn eq(&self, other: &StepError) -> bool {
         format!("{self:?}") == format!("{other:?}")
@@ -238,7 +238,7 @@ impl From<SdoError> for StepError {
     }
 }
 
-/// The state that a failed change left behind.
+/// The state after a failed change.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PdoEffect {
     /// The previous mapping and parameters are set.
@@ -246,7 +246,7 @@ pub enum PdoEffect {
         /// The TPDO.
         number: TpdoNumber,
     },
-    /// The previous settings could not be set again.
+    /// The previous settings could not be restored.
     Incomplete(Box<Incomplete>),
     /// The new settings are set, but not stored.
     SetNotStored {
@@ -255,13 +255,13 @@ pub enum PdoEffect {
     },
 }
 
-/// A change that was neither completed nor undone.
+/// A change that was neither completed nor reverted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Incomplete {
     /// The last confirmed write; `None` if no write was confirmed.
     pub last: Option<StepWrite>,
-    /// Why the previous settings could not be set again, and the write at which that failed; `None` if the reason is
-    /// that of the change.
+    /// Why the previous settings could not be restored, and the failed write; `None` if the reason is that of the
+    /// change.
     pub restore: Option<(StepError, Option<StepWrite>)>,
     /// The previous settings.
     pub previous: Settings,
@@ -274,7 +274,7 @@ pub struct Incomplete {
 /// A fact about a TPDO that was set.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PdoFact {
-    /// The TPDO already had the requested settings: nothing was written.
+    /// The TPDO already had the requested settings, so nothing was written.
     AlreadySet {
         /// The TPDO.
         number: TpdoNumber,
@@ -284,7 +284,7 @@ pub enum PdoFact {
         /// The TPDO.
         number: TpdoNumber,
     },
-    /// The settings are stored, and the device acknowledged it.
+    /// The device acknowledged that it stored the settings.
     Stored {
         /// The groups of 1010h.
         groups: Vec<Group>,
@@ -294,7 +294,7 @@ pub enum PdoFact {
         /// The object.
         object: ObjectId,
     },
-    /// The device does not accept bit 31 of the COB-ID: the TPDO was changed while it was on.
+    /// The device does not accept bit 31 of the COB-ID, so the TPDO was changed while it was on.
     ChangedWhileOn {
         /// The TPDO.
         number: TpdoNumber,
@@ -307,7 +307,7 @@ pub enum PdoFact {
         number: TpdoNumber,
         /// The error.
         error: StepError,
-        /// The write at which it failed.
+        /// The failed write.
         write: Option<StepWrite>,
     },
     /// The TPDO is off.
@@ -362,7 +362,7 @@ impl PdoFailure {
 }
 
 impl PdoFact {
-    /// Whether the user should act on it.
+    /// Whether the fact is a warning.
     pub fn is_warning(&self) -> bool {
         matches!(self, PdoFact::ChangedWhileOn { .. } | PdoFact::SetDespite { .. })
     }

@@ -1,4 +1,4 @@
-//! Whether a CAN identifier is free for a TPDO.
+//! Checks whether a CAN identifier is free for a TPDO.
 
 use super::failure::{Occupant, PdoFailure};
 use super::session::Session;
@@ -40,7 +40,7 @@ const COB_IDS: [(u16, u8, &str); 14] = [
     (0x1806, 1, "TPDO7"),
 ];
 
-/// Checks that the node itself does not use the identifier for something else.
+/// Checks that the node does not use the identifier for another object.
 ///
 /// # Errors
 /// [`PdoFailure::Occupied`].
@@ -59,8 +59,8 @@ pub(super) fn check_own(node: &Node, number: TpdoNumber, id: CanId) -> Result<()
     }
 }
 
-/// Checks that no other node uses the identifier: reads the identifiers of the nodes that a scan finds, and listens for
-/// a moment.
+/// Checks that no other node uses the identifier. Reads the identifiers of the nodes found by a scan, and listens for a
+/// short time.
 ///
 /// # Errors
 /// [`PdoFailure::Occupied`]; bus errors and Ctrl-C.

@@ -33,10 +33,11 @@ pub struct MapReport {
     pub notes: Vec<Note>,
 }
 
-/// Sets a TPDO as requested. With `store` the device then stores the settings. All checks come before the first write.
+/// Sets a TPDO as requested. With `store` the device then stores the settings. All checks are made before the first
+/// write.
 ///
 /// # Errors
-/// If a step failed, the old settings are restored. If that failed as well, the failure contains the last confirmed step
+/// If a step failed, the old settings are restored. If this also failed, the failure contains the last confirmed step
 /// and the old settings.
 pub fn map(
     master: &mut Master<'_>,
@@ -85,7 +86,7 @@ pub fn map(
     Ok(MapReport { shown: TpdoReport::new(&node, wanted), writes, stored: stored.is_some(), notes })
 }
 
-/// A change of a TPDO that was carried out.
+/// A completed change of a TPDO.
 pub(in crate::tasks) struct Changed {
     /// The number of writes.
     pub writes: u32,
@@ -143,8 +144,8 @@ fn change_settings(mut session: Session<'_, '_>, old: Settings, wanted: Settings
     Ok(Changed { writes: change.session.writes, wanted: change.wanted, notes: change.notes })
 }
 
-/// Plans how to store the settings of a TPDO: as communication settings, if the device has a group for them. Some devices
-/// reset custom COB-IDs if everything is stored.
+/// Plans how to store the settings of a TPDO: as communication settings, if the device has this group. Some devices
+/// reset custom COB-IDs if all settings are stored.
 fn store_plan(master: &mut Master<'_>, node: &Node, number: TpdoNumber) -> Result<store::StorePlan, Failure> {
     if node.model.as_deref().is_some_and(|model| !is_stored(model, number)) {
         return Err(Failure::at(node.id, PdoFailure::NotStored { number }));

@@ -1,8 +1,8 @@
-//! TPDOs: their settings, a change of the settings as a transaction, and the values that they carry.
+//! Shows the settings of TPDOs, changes them as a transaction, and receives their values.
 //!
-//! A mapping is changed in the order of CiA 301 (7.5.2.37, 7.5.2.38): switch the PDO off, set the number of entries to 0,
-//! write the entries, their number and the other parameters, switch the PDO on. Then either the new settings are read
-//! back, or the old ones are restored. If neither is possible, the failure describes the present state.
+//! A mapping is changed in the order of CiA 301 (7.5.2.37, 7.5.2.38): switch the PDO off, set the number of entries to
+//! 0, write the entries, their number and the other parameters, switch the PDO on. Then the new settings are read back.
+//! If a step fails, the old settings are restored. If neither is possible, the failure describes the present state.
 
 mod change;
 mod failure;

@@ -1,4 +1,4 @@
-//! A requested change of a TPDO, and the settings that follow from it.
+//! A requested change of a TPDO, and the resulting settings.
 
 use super::failure::{Parameter, PdoFact, PdoFailure};
 use super::session::Session;
@@ -74,7 +74,7 @@ impl PdoRequest {
         }
     }
 
-    /// The requested mapping, `None` to keep the mapping; and notes about it.
+    /// The requested mapping (`None` keeps the mapping), and notes about it.
     ///
     /// # Errors
     /// Unknown names, objects of unknown width, more than 64 bits.
@@ -168,7 +168,7 @@ fn named(node: &Node, name: &str) -> Result<ObjectId, Failure> {
     }
 }
 
-/// The entry for an item as `pdo map` and files write it: `pressure`, `pressure.status`, `0x9130:1/32`. Needs no bus.
+/// The mapping entry for an item of `pdo map` or a file: `pressure`, `pressure.status`, `0x9130:1/32`. Needs no bus.
 ///
 /// # Errors
 /// Unknown names, wrong numbers of bits, objects of unknown width.
@@ -188,7 +188,7 @@ pub(in crate::tasks) fn entry_of(node: &Node, text: &str) -> Result<MappingEntry
     }
 }
 
-/// The shortest text from which [`entry_of`] reads this entry.
+/// The shortest text that [`entry_of`] converts to this entry.
 pub(in crate::tasks) fn text_of(node: &Node, entry: MappingEntry) -> String {
     let signals = node.signals.iter().flat_map(|signal| [signal.name.clone(), format!("{}.status", signal.name)]);
     let texts = signals.chain([node.name_of(entry.object), entry.object.to_string()]);
@@ -208,8 +208,8 @@ fn unknown_name(node: &Node, name: &str) -> PdoFailure {
     PdoFailure::UnknownName { name: name.to_owned(), nearest: nearest(name, known), signals }
 }
 
-/// The object of a signal to map: its process value, unless according to the description only another object with the
-/// same value can be mapped.
+/// The object to map for a signal: its process value. If the description does not allow this, another object with the
+/// same value.
 fn value_object(node: &Node, signal: &Signal) -> ObjectId {
     let value = signal.value_object.0;
     let Some(model) = &node.model else { return value };
@@ -232,7 +232,7 @@ fn width(node: &Node, object: ObjectId) -> Option<u8> {
     let family = PROCESS_VALUES.iter().find(|&&(index, _)| index == object.index).map(|&(_, data_type)| data_type);
     let family = family.or_else(|| node.layout().data_type(object));
     let standard = || standard::entry(object).map(|entry| entry.data_type);
-    // Indices below 20h are the types themselves: they are mapped as dummies.
+    // Indices below 20h are data types, which are mapped as dummies.
     let dummy = || DataType::from_code(object.index).filter(|_| object.sub == 0 && object.index < 0x20);
     match described.or(family).or_else(standard).or_else(dummy)? {
         DataType::Boolean => Some(1),

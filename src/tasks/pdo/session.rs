@@ -1,4 +1,4 @@
-//! The exchanges of one change with a node. Boot-up messages that arrive meanwhile are counted as a restart.
+//! The exchanges of one change with a node. A boot-up message during the change counts as a restart.
 
 use super::failure::{StepError, StepWrite};
 use crate::bus::Received;
@@ -74,7 +74,7 @@ impl<'a, 'bus> Session<'a, 'bus> {
         if self.has_restarted { Err(StepError::Restarted) } else { Ok(()) }
     }
 
-    /// Reads another object after a cancelled exchange: after its answer, no older answer can arrive.
+    /// Reads another object after a cancelled exchange, because no older answer can arrive after its answer.
     pub(super) fn discard_late_answers(&mut self) -> Result<(), StepError> {
         match self.exchange(ObjectId::DEVICE_TYPE)? {
             Ok(_) | Err(SdoError { failure: SdoFailure::Refused(_), .. }) => Ok(()),
@@ -82,7 +82,7 @@ impl<'a, 'bus> Session<'a, 'bus> {
         }
     }
 
-    /// Waits for a sign of life of a node that can answer SDO requests. Returns whether one came.
+    /// Waits until a node shows that it can answer SDO requests. Returns whether it did.
     pub(super) fn wait_for_life(&mut self, timeout: Duration) -> Result<bool, Error> {
         let (until, own) = (self.master.now() + timeout, self.node.id);
         let life = wait(self.master, until, Policy::Reconnect, |_, event| {

@@ -25,7 +25,7 @@ pub struct Settings {
     pub event_timer_ms: Option<u16>,
     /// The mapping (1Axxh), in order.
     pub mapping: Vec<MappingEntry>,
-    /// Whether it is a multiplexed PDO (1Axxh:0): its mapping is not a list.
+    /// Whether the PDO is multiplexed (1Axxh:0), so that its mapping is not a list.
     pub multiplexed: bool,
 }
 
@@ -33,7 +33,7 @@ impl Settings {
     /// Reads all settings; the inhibit time only if `inhibit` is true.
     ///
     /// # Errors
-    /// Any error, except a missing event timer or inhibit time: settings can be restored only if all of them are known.
+    /// Any error except a missing event timer or inhibit time, because settings can be restored only if all are known.
     pub(super) fn read(
         session: &mut Session<'_, '_>,
         number: TpdoNumber,
@@ -65,7 +65,7 @@ impl Settings {
     }
 
     /// The first object in which these settings differ from others, with both numbers. Bit 30 of the COB-ID (no remote
-    /// requests) is ignored: the device decides.
+    /// requests) is ignored, because some devices set it themselves.
     pub(super) fn difference(&self, other: &Settings) -> Option<(ObjectId, u64, u64)> {
         let number = self.number;
         let wide = |number: Option<u16>| number.map_or(0, u64::from);
@@ -84,7 +84,7 @@ impl Settings {
     }
 }
 
-/// `None` for an object that the device does not have.
+/// The number; `None` for an object that the device does not have.
 fn optional(result: Result<u32, StepError>) -> Result<Option<u16>, StepError> {
     match result {
         Ok(number) => Ok(u16::try_from(number).ok()),

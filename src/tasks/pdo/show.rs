@@ -1,4 +1,4 @@
-//! The settings of TPDOs, with the signals that they carry.
+//! The settings of TPDOs, with their signals.
 
 use super::failure::{PdoFailure, not_read};
 use super::session::Session;
@@ -17,7 +17,7 @@ use std::time::Duration;
 pub struct MappedItem {
     /// The entry.
     pub entry: MappingEntry,
-    /// `pressure`, `pressure.status`, else the name of the object; `None` if it has none.
+    /// `pressure`, `pressure.status`, or the name of the object; `None` if the object has no name.
     pub signal: Option<String>,
     /// The unit of a process value, if the device reports it.
     pub unit: Option<Unit>,
@@ -59,7 +59,7 @@ fn mapped_item(node: &Node, entry: MappingEntry) -> MappedItem {
     MappedItem { entry, signal: name, unit: layout.unit_of(entry.object) }
 }
 
-/// Whether the TPDO may have an inhibit time (180xh:3): a description that lists objects lists all of them.
+/// Whether the TPDO may have an inhibit time (180xh:3). A description with objects is complete.
 pub(super) fn may_have_inhibit_time(node: &Node, number: TpdoNumber) -> bool {
     let described = node.model.as_ref().filter(|model| !model.description.objects.is_empty());
     described.is_none_or(|model| model.dictionary.get(number.communication(3)).is_some())

@@ -21,7 +21,7 @@ impl StateSwitch {
     /// Bus errors and Ctrl-C.
     pub(super) fn enter(&mut self, session: &mut Session<'_, '_>) -> Result<(), StepError> {
         let node = session.node.id;
-        // Guarding requests of another master are remote frames: only the filter for all frames passes them.
+        // Guarding requests of another master are remote frames, which pass only the filter for all frames.
         session.master.listen(&Filters::All)?;
         if self.before.is_none() {
             let before = state(session.master, node)?;
@@ -49,7 +49,7 @@ impl StateSwitch {
     /// Sets the node to its previous state, if that is known.
     ///
     /// # Errors
-    /// Bus errors and Ctrl-C. The command has been sent anyway.
+    /// Bus errors and Ctrl-C. The command was sent in any case.
     pub(super) fn restore(&mut self, session: &mut Session<'_, '_>) -> Result<Option<StateEffect>, StepError> {
         let node = session.node.id;
         let (back, before) = match self.before.take() {

@@ -22,10 +22,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// After this time without a TPDO, that is reported once.
+/// The time without a TPDO after which this is reported once.
 const FIRST_TPDO_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// How much later than twice its interval a heartbeat may come.
+/// The tolerated delay of a heartbeat, in addition to twice its interval.
 const HEARTBEAT_TOLERANCE: Duration = Duration::from_millis(50);
 
 /// An event while TPDOs are received.
@@ -55,9 +55,9 @@ pub enum WatchEvent<'a> {
         /// Its length in bytes.
         length: usize,
     },
-    /// A node restarted: its mapping may have changed.
+    /// A node restarted, so its mapping may have changed.
     Restarted(NodeId),
-    /// The mapping of a node could not be read: its TPDOs are not shown.
+    /// The mapping of a node could not be read, so its TPDOs are not shown.
     Failed(&'a Failure),
     /// A TPDO arrives twice at a SYNC, with the same values.
     Repeated(NodeId, TpdoNumber),
@@ -66,8 +66,8 @@ pub enum WatchEvent<'a> {
 }
 
 /// Shows the TPDOs of the nodes until the time has passed, or until Ctrl-C or `on_event` ends it. Sends no NMT command.
-/// Returns the failures of the nodes whose mapping could not be read; the other nodes are shown. In a recording, the
-/// mapping comes from its SDO traffic or from a description that the user named.
+/// Returns the failures of the nodes whose mapping could not be read; the other nodes are shown. For a replayed
+/// recording, the mapping comes from its SDO traffic, or from a description named by the user.
 ///
 /// # Errors
 /// [`PdoFailure::NothingReceived`]; bus errors, and Ctrl-C before the first TPDO.
@@ -133,14 +133,14 @@ struct Watcher<'a> {
     decoder: Decoder,
     numbers: BTreeMap<CanId, TpdoNumber>,
     synced: SyncedTpdos,
-    /// What the nodes sent besides TPDOs, and when their last heartbeat came.
+    /// Other frames of the nodes, and the time of their last heartbeat.
     heard: BTreeMap<NodeId, (Heard, Mono)>,
-    /// The questions to the silent nodes.
+    /// The reads from silent nodes.
     inquiry: Option<Inquiry>,
     samples: Vec<Sample>,
     start: Mono,
     end: Mono,
-    /// The end, or the time to report that nothing was received.
+    /// The end, or the time to report that no TPDO was received.
     next: Mono,
     has_received: bool,
     failures: Vec<Failure>,
@@ -172,7 +172,7 @@ impl<'a> Watcher<'a> {
         }
     }
 
-    /// Keeps the numbers of the TPDOs of a node for their COB-IDs.
+    /// Stores the TPDO numbers of a node by COB-ID.
     fn set_up(&mut self, node: &Node) {
         self.synced.set_up(node);
         let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
@@ -233,7 +233,7 @@ impl<'a> Watcher<'a> {
         }
     }
 
-    /// Heartbeats, boot-up messages, emergencies and SYNC show why there may be no TPDO.
+    /// Handles heartbeats, boot-up messages, emergencies and SYNC. They may explain missing TPDOs.
     fn on_other_frame(&mut self, received: &Received) -> ControlFlow<()> {
         let (frame, now) = (&received.frame, received.at.mono);
         for node in self.nodes.iter().filter(|node| node.sync == frame.id() && !frame.is_remote()) {
@@ -285,7 +285,7 @@ impl<'a> Watcher<'a> {
             return Err(Failure::at(node, LogFailure::UnknownMapping));
         }
         if self.setup.is_some() {
-            // Nothing can be done for the nodes of a recording.
+            // No advice is possible for the nodes of a recording.
             return Err(Failure::general(PdoFailure::NothingReceived { nodes: Vec::new() }));
         }
         let now = master.now();
@@ -296,7 +296,7 @@ impl<'a> Watcher<'a> {
     }
 }
 
-/// Whether a TPDO carries anything.
+/// Whether a TPDO contains an object.
 fn carries_something(tpdo: &Tpdo) -> bool {
     !tpdo.mapping.is_empty()
 }

@@ -32,7 +32,7 @@ pub enum ReadFailure {
     },
     /// The type of the object is unknown.
     TypeUnknown {
-        /// The object, as it was named.
+        /// The object as entered by the user.
         signal: String,
         /// The bytes that were received.
         raw: Raw,

@@ -14,14 +14,14 @@ use crate::tasks::Failure;
 const REGISTER: ObjectId = ObjectId::new(0x1001, 0);
 const HISTORY: ObjectId = ObjectId::new(0x1003, 0);
 
-/// The errors of a node, and how many were deleted from its history.
+/// The errors of a node, and the number of errors deleted from its history.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorReport {
     /// The node.
     pub node: NodeId,
     /// Register and history, after a deletion.
     pub errors: Errors,
-    /// How many errors the history held before it was deleted; `None` if it was not deleted.
+    /// The number of errors in the history before it was deleted; `None` if it was not deleted.
     pub cleared: Option<u64>,
 }
 
@@ -47,7 +47,7 @@ pub struct ErrorCounter {
     pub object: ObjectId,
     /// Its name in the description.
     pub name: String,
-    /// What it counts.
+    /// The meaning of the counter.
     pub text: String,
     /// The count; `None` if it cannot be read.
     pub count: Option<u64>,
@@ -133,7 +133,7 @@ fn detail(entry: &EmergencyEntry, bytes: [u8; 2]) -> String {
         } else if folded.contains("status") {
             Some(format!("status 0x{byte:02X}"))
         } else if let Some((name, words)) = meaning.split_once(": ") {
-            // The meanings of its numbers follow: `CAN error state: 0 stopped, 1 sleep`.
+            // The name is followed by the meanings of the numbers: `CAN error state: 0 stopped, 1 sleep`.
             let mut words = words.split(", ").filter_map(|word| word.split_once(' '));
             let word = words.find(|(number, _)| number.parse() == Ok(byte)).map(|(_, word)| format!(" ({word})"));
             Some(format!("{name} {byte}{}", word.unwrap_or_default()))
@@ -145,8 +145,8 @@ fn detail(entry: &EmergencyEntry, bytes: [u8; 2]) -> String {
     parts.collect::<Vec<_>>().join(", ")
 }
 
-/// Deletes the history and reads it again; the errors before and after. A pending error stays in the register, and may
-/// be in the history again at once.
+/// Deletes the history and reads it again. Returns the errors before and after. A pending error stays in the register,
+/// and may be in the history again at once.
 ///
 /// # Errors
 /// The device has no history, rejects the write, does not answer, or keeps its history.
@@ -159,7 +159,7 @@ pub fn clear(master: &mut Master<'_>, node: &Node) -> Result<(Errors, Errors), F
     write(master, node, HISTORY, &[0; 4][..width])?;
     let now = read(master, node)?;
     let left = now.count.unwrap_or(0);
-    // Fewer errors than before, or different ones, are new.
+    // If there are fewer or different errors, they are new.
     let are_new = left < count || now.history != before.history;
     if left > 0 && !are_new {
         let cause = SettingsFailure::HistoryNotCleared { count: left };

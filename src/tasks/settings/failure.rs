@@ -11,12 +11,12 @@ use crate::tasks::Kind;
 /// A setting could not be shown or changed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SettingsFailure {
-    /// The device has several signals, and none was named.
+    /// The device has several signals, but the user named none.
     WhichSignal {
         /// The signals of the device.
         available: Vec<String>,
     },
-    /// The signal is no channel of CiA 404, so it has no unit, filter or limits to set.
+    /// The signal is not a CiA 404 channel, so it has no unit, filter or limits.
     NoChannel {
         /// The signal.
         signal: String,
@@ -25,12 +25,12 @@ pub enum SettingsFailure {
     NoErrorObjects,
     /// The device has no error history (1003h).
     NoErrorHistory,
-    /// The device acknowledged that it cleared the history, and the history is unchanged.
+    /// The device acknowledged the deletion of the history, but the history is unchanged.
     HistoryNotCleared {
         /// The number of errors in the history.
         count: u64,
     },
-    /// The signal, or every signal, has no filter (61A0h, 61A1h).
+    /// This signal (or all signals) has no filter (61A0h, 61A1h).
     NoFilter {
         /// The signal, if one was named.
         signal: Option<String>,
@@ -48,9 +48,9 @@ pub enum SettingsFailure {
         signal: String,
         /// The type.
         wanted: FilterType,
-        /// Code and meaning of the types that it has.
+        /// Code and meaning of the available types.
         available: Vec<(u64, String)>,
-        /// The doubt about them in the description; may be empty.
+        /// The doubt about the types in the description; may be empty.
         doubt: String,
     },
     /// No object is known that accepts a damping.
@@ -58,7 +58,7 @@ pub enum SettingsFailure {
         /// The signal.
         signal: String,
     },
-    /// A damping sets the moving average, and the filter is of another type.
+    /// A damping requires the moving average, but the filter has another type.
     DampingOfOtherType {
         /// The signal.
         signal: String,
@@ -67,9 +67,9 @@ pub enum SettingsFailure {
     },
     /// The damping is longer than 65535 ms.
     DampingTooLong,
-    /// The signal, or every signal, has no unit (6131h).
+    /// This signal (or all signals) has no unit (6131h).
     NoUnit {
-        /// The signal, if it is one.
+        /// The signal, if the failure is for one signal.
         signal: Option<String>,
     },
     /// The unit of the signal cannot be changed.
@@ -85,14 +85,14 @@ pub enum SettingsFailure {
         signal: String,
         /// The unit.
         unit: Unit,
-        /// The units that it accepts.
+        /// The accepted units.
         accepted: Vec<Unit>,
     },
     /// The signal has neither a delta nor limits.
     NoLimits {
         /// The signal.
         signal: String,
-        /// The first and the last object that were looked for.
+        /// The first and the last object of the search.
         objects: [ObjectId; 2],
     },
     /// The signal does not have this limit.
@@ -101,7 +101,7 @@ pub enum SettingsFailure {
         signal: String,
         /// The limit.
         limit: Limit,
-        /// The object that was looked for.
+        /// The missing object.
         object: ObjectId,
     },
     /// The lower limit would be above the upper limit.
@@ -113,7 +113,7 @@ pub enum SettingsFailure {
         /// The upper limit, in the unit of the signal.
         upper: f64,
     },
-    /// The device cannot hold this limit.
+    /// The limit does not fit the object.
     LimitValue {
         /// The signal.
         signal: String,
@@ -129,17 +129,17 @@ pub enum SettingsFailure {
         /// The signal.
         signal: String,
     },
-    /// The device acknowledged the reset, and minimum and maximum are unchanged.
+    /// The device acknowledged the reset, but minimum and maximum are unchanged.
     MinMaxNotReset {
         /// The signal.
         signal: String,
     },
 }
 
-/// A number in the unit of a signal that its object cannot hold.
+/// A number in the unit of a signal that does not fit its object.
 #[derive(Clone, Debug, PartialEq)]
 pub enum QuantityError {
-    /// The number has more decimals than the device.
+    /// The number has more decimal digits than the device.
     TooFine {
         /// The number.
         number: f64,
@@ -153,12 +153,12 @@ pub enum QuantityError {
 /// The limits after a failed change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SettingsEffect {
-    /// The previous limits of the signal are set again.
+    /// The previous limits of the signal were restored.
     LimitsRestored {
         /// The signal.
         signal: String,
     },
-    /// Not all previous limits of the signal could be set again.
+    /// Not all previous limits of the signal could be restored.
     LimitsNotRestored {
         /// The signal.
         signal: String,
@@ -180,14 +180,14 @@ pub enum SettingsFact {
         /// The unit.
         unit: Unit,
     },
-    /// The device kept the number of an object when the unit changed, so it means something else now.
+    /// The device kept the number of an object when the unit changed, so the meaning of the number has changed.
     NotConverted {
         /// The name of the object.
         name: String,
         /// Its value now.
         now: Option<ValueWithUnit>,
     },
-    /// The device acknowledged the damping, and the filter constant did not change.
+    /// The device acknowledged the damping, but the filter constant did not change.
     DampingNotShown {
         /// The filter constant, if it is known.
         constant: Option<u64>,
@@ -199,7 +199,7 @@ pub enum SettingsFact {
         /// Its meaning.
         meaning: String,
     },
-    /// The repeating average is formed between two TPDOs, and for a limited time only.
+    /// The repeating average is formed between two TPDOs, and only for a limited time.
     RepeatingLimit {
         /// The TPDO.
         tpdo: String,
@@ -208,7 +208,7 @@ pub enum SettingsFact {
         /// The longest time in ms.
         limit_ms: u16,
     },
-    /// The TPDO is sent on events, and its event timer and the delta are 0.
+    /// The TPDO is sent on events, but its event timer and the delta are 0.
     MayNeverSend {
         /// The TPDO.
         tpdo: String,
@@ -244,7 +244,7 @@ impl SettingsFailure {
 }
 
 impl SettingsFact {
-    /// Whether the user should act on it.
+    /// Whether the fact is a warning.
     pub fn is_warning(&self) -> bool {
         !matches!(self, SettingsFact::AlreadyInUnit { .. })
     }

@@ -1,4 +1,4 @@
-//! The filter of a signal: type (61A0h), constant (61A1h), and the damping from which some devices calculate the
+//! The filter of a signal: type (61A0h), constant (61A1h), and the damping, from which some devices calculate the
 //! constant (MH-4 2023h).
 
 use super::{SettingsFact, SettingsFailure, find_signal, read_each, set_object};
@@ -13,7 +13,7 @@ use crate::node::write::write;
 use crate::tasks::{Fact, Failure, Note};
 use std::time::Duration;
 
-/// A filter as it is reported.
+/// The report of a filter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilterReport {
     /// The filter, read from the device.
@@ -57,7 +57,7 @@ pub struct FilterRequest {
     pub kind: Option<FilterType>,
     /// The constant (61A1h).
     pub constant: Option<u16>,
-    /// The time in which the output follows a step, at most 65535 ms. The device calculates the constant.
+    /// The settling time after a step, at most 65535 ms. The device calculates the constant.
     pub damping: Option<Duration>,
 }
 
@@ -110,7 +110,7 @@ pub fn has_filter(node: &Node, signal: &Signal) -> bool {
     node.may_have(kind_object(signal)) || node.may_have(constant_object(signal))
 }
 
-/// The filter of one signal, or of every signal that has one.
+/// The filter of one signal, or of every signal with a filter.
 ///
 /// # Errors
 /// No such signal, no filter, no answer.
@@ -141,10 +141,10 @@ fn filter_of(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Op
     Ok(is_known.then(|| FilterOf { node: node.id, signal: signal.name.clone(), code, kind, constant }))
 }
 
-/// Sets the filter of a signal, or of the only signal that has one, and reads it back.
+/// Sets the filter of a signal, or of the only signal with a filter, and reads it back.
 ///
 /// # Errors
-/// The device does not accept the settings (known from its description, or from its answer), does not answer, or keeps
+/// The device does not accept the settings (according to its description or its answer), does not answer, or keeps
 /// other settings.
 pub fn set(
     master: &mut Master<'_>,
@@ -161,7 +161,7 @@ pub fn set(
     if !has_filter(node, signal) {
         return Err(no_filter());
     }
-    // All checks come before the first write.
+    // All checks are made before the first write.
     let kind = wanted.kind.map(|kind| code_of(node, signal, kind)).transpose()?;
     let constant = constant_object(signal);
     if let (Some(number), Some(entry)) = (wanted.constant, node.described(constant))
@@ -194,7 +194,7 @@ pub fn set(
     Ok(FilterReport { filter: now, damping_shown, notes })
 }
 
-/// What the description states about the effect of a filter, if that may be unexpected.
+/// Notes about unexpected effects of a filter, from the description.
 fn doubts(node: &Node, signal: &Signal, filter: &FilterOf) -> Vec<Note> {
     let mut notes = Vec::new();
     let is_repeating = filter.kind.starts_with(FilterType::Repeating.word());
@@ -238,7 +238,7 @@ fn damping_write(
     Ok((object, milliseconds.map_err(|_| Failure::at(node.id, SettingsFailure::DampingTooLong))?))
 }
 
-/// The code of a type on this device, if it has the same meaning there: the MC1609 may use 0 for a filter.
+/// The code of a type on this device, if the meaning is the same. The MC1609, for example, may use 0 for a filter.
 fn code_of(node: &Node, signal: &Signal, kind: FilterType) -> Result<u8, Failure> {
     let code = kind.code();
     let Some(entry) = node.described(kind_object(signal)).filter(|entry| !entry.values.is_empty()) else {

@@ -1,4 +1,4 @@
-//! The page of `info`: everything about one device.
+//! Reads the page of `info`: everything about one device.
 
 use super::errors::{Errors, read as read_errors};
 use super::limits::Limit;
@@ -47,7 +47,7 @@ pub struct Info {
     pub calibrated: Option<Date>,
     /// The date of production.
     pub produced: Option<Date>,
-    /// The manufacturer's own objects.
+    /// The manufacturer-specific objects.
     pub own: Vec<Setting>,
     /// The groups of 1010h, and the settings that it stores.
     pub store: Store,
@@ -78,7 +78,7 @@ pub struct Setting {
 /// The meaning of the value of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Meaning {
-    /// Nothing else is known.
+    /// The meaning is unknown.
     Plain,
     /// A number in the unit of its signal.
     Quantity(ValueWithUnit),
@@ -98,7 +98,7 @@ pub enum Meaning {
     Milliseconds,
 }
 
-/// A date as the device stores it. The numbers need not be a date.
+/// A date as stored in the device. The numbers may be invalid as a date.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Date {
     /// Year, month and day.
@@ -136,23 +136,23 @@ const LIFE_TIME: ObjectId = ObjectId::new(0x100d, 0);
 const STORE: ObjectId = ObjectId::new(0x1010, 0);
 const HEARTBEAT: ObjectId = ObjectId::new(0x1017, 0);
 
-/// The communication objects on the page. Identity, TPDOs and errors have sections of their own.
+/// The communication objects on the page. Identity, TPDOs and errors have their own sections.
 const COMMUNICATION: [u16; 9] = [0x1005, 0x1006, 0x100c, 0x100d, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
 
 /// The scaling objects of a channel, as indices without the first digit. Every family has them.
 const SCALING: [u16; 5] = [0x120, 0x121, 0x122, 0x123, 0x124];
 
-/// A node with a longer heartbeat time is shown without its state: the page should appear at once.
+/// If the heartbeat time is longer, the state is not shown, because the page should appear at once.
 const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// The objects on the page.
 struct Selection {
     communication: Vec<ObjectId>,
-    /// For each signal.
+    /// The objects of each signal.
     channels: Vec<Vec<ObjectId>>,
     own: Vec<ObjectId>,
     dates: [Option<[ObjectId; 3]>; 2],
-    /// For each TPDO.
+    /// The inhibit time of each TPDO.
     inhibit: Vec<ObjectId>,
 }
 
@@ -168,7 +168,7 @@ impl Selection {
         }
     }
 
-    /// Reads the objects that the node can have. One that is not answered affects no other.
+    /// Reads the objects that the node can have. A missing answer does not affect other objects.
     fn read(&self, master: &mut Master<'_>, node: &Node) -> Result<BTreeMap<ObjectId, Value>, Failure> {
         let all: BTreeSet<ObjectId> = [HARDWARE, SOFTWARE]
             .into_iter()
@@ -271,8 +271,8 @@ fn of_channel(node: &Node, signal: &Signal) -> Vec<ObjectId> {
     objects
 }
 
-/// The manufacturer-specific objects that belong to no channel. On a device without described signals also the objects
-/// of its profile, from the EDS or the profile.
+/// The manufacturer-specific objects without a channel. If no signals are described, also the objects of the profile,
+/// from the EDS or the profile.
 fn own(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
     let taken: BTreeSet<ObjectId> = channels.iter().flatten().copied().collect();
     let values = node.signals.iter().flat_map(|signal| signal.other_objects.iter().copied());
@@ -334,8 +334,8 @@ fn samples(master: &mut Master<'_>, node: &Node) -> Result<Vec<Option<Sample>>, 
     Ok(samples)
 }
 
-/// The NMT state, if a heartbeat shows it soon. Node guarding is not used: it would disturb the toggle bit of another
-/// master that guards the node.
+/// The NMT state, if a heartbeat shows it soon. Node guarding is not used, because it would disturb the toggle bit for
+/// another guarding master.
 fn state(
     master: &mut Master<'_>,
     node: &Node,

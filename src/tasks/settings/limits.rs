@@ -1,4 +1,4 @@
-//! What triggers a TPDO: delta, lower limit, upper limit and hysteresis of a signal (CiA 404, x133h to x136h, in the
+//! The triggers of a TPDO: delta, lower limit, upper limit and hysteresis of a signal (CiA 404, x133h to x136h, in the
 //! family of the process value).
 
 use super::{
@@ -18,16 +18,16 @@ use crate::tasks::{Fact, Failure, Kind, Note};
 pub enum Limit {
     /// x133h: a change of at least this triggers the TPDO.
     Delta,
-    /// x134h: a value that falls below it triggers the TPDO.
+    /// x134h: a value that falls below this limit triggers the TPDO.
     Lower,
-    /// x135h: a value that rises above it triggers the TPDO.
+    /// x135h: a value that rises above this limit triggers the TPDO.
     Upper,
-    /// x136h: the distance from a limit that re-arms it.
+    /// x136h: the distance from a limit at which the limit can trigger again.
     Hysteresis,
 }
 
 impl Limit {
-    /// All of them, in the order of their objects.
+    /// All limits, in the order of their objects.
     pub const ALL: [Limit; 4] = [Limit::Delta, Limit::Lower, Limit::Upper, Limit::Hysteresis];
 
     /// Its name in options and reports.
@@ -105,15 +105,15 @@ struct LimitWrite {
     object: ObjectId,
     rises: bool,
     bytes: Vec<u8>,
-    /// The bytes of the previous number; empty if the object cannot hold it.
+    /// The bytes of the previous number; empty if the number does not fit.
     previous: Vec<u8>,
 }
 
-/// Sets limits of a signal, in its unit, and reads them back. If the device rejects one, the previous limits are set
-/// again.
+/// Sets limits of a signal, in its unit, and reads them back. If the device rejects a limit, the previous limits are
+/// restored.
 ///
 /// # Errors
-/// The device cannot hold a number, the lower limit is above the upper limit, the device rejects a limit or does not
+/// A number does not fit its object, the lower limit is above the upper limit, the device rejects a limit or does not
 /// answer.
 pub fn set(master: &mut Master<'_>, node: &Node, signal: &str, wanted: &[(Limit, f64)]) -> Result<Limits, Failure> {
     let before = show(master, node, signal)?;
@@ -123,7 +123,8 @@ pub fn set(master: &mut Master<'_>, node: &Node, signal: &str, wanted: &[(Limit,
     for &(limit, number) in wanted {
         writes.push(limit_write(node, described, &before, limit, number)?);
     }
-    // A device may reject a lower limit above the present upper limit: rising limits start with the upper one.
+    // A device may reject a lower limit above the present upper limit, so rising limits are written with the upper one
+    // first.
     if writes.iter().any(|write| write.limit == Limit::Upper && write.rises) {
         writes.reverse();
     }
@@ -133,7 +134,7 @@ pub fn set(master: &mut Master<'_>, node: &Node, signal: &str, wanted: &[(Limit,
         if matches!(failure.kind(), Kind::NoAnswer | Kind::Bus | Kind::Interrupted) {
             return Err(failure.with(node.id, SettingsEffect::LimitsUnknown { signal }));
         }
-        // An object that was acknowledged and has another value is set again as well.
+        // An acknowledged object with another value is also restored.
         let done = if failure.kind() == Kind::Unexpected { at + 1 } else { at };
         let mut is_restored = true;
         for write in writes.iter().take(done).rev() {
@@ -150,7 +151,7 @@ pub fn set(master: &mut Master<'_>, node: &Node, signal: &str, wanted: &[(Limit,
     Ok(now)
 }
 
-/// Checks that the lower limit will not be above the upper limit.
+/// Checks that the lower limit will not exceed the upper limit.
 fn check_order(node: &Node, before: &Limits, wanted: &[(Limit, f64)]) -> Result<(), Failure> {
     let number = |limit: Limit| {
         let requested = wanted.iter().find(|(other, _)| *other == limit).map(|&(_, number)| number);
@@ -186,7 +187,7 @@ fn limit_write(
     Ok(LimitWrite { limit, object, rises: number > old, bytes, previous: encode(old).unwrap_or_default() })
 }
 
-/// The TPDOs that carry the signal and are sent only on events, while the delta is 0.
+/// The TPDOs with the signal that are sent only on events, if the delta is 0.
 fn silent(node: &Node, signal: &Signal, values: &[(Limit, ObjectId, ValueWithUnit)]) -> Vec<String> {
     let delta = values.iter().find(|(limit, ..)| *limit == Limit::Delta);
     if delta.is_none_or(|(_, _, quantity)| quantity.number.as_f64() != 0.0) {

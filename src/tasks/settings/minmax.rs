@@ -11,7 +11,7 @@ use crate::node::Node;
 use crate::node::write::write;
 use crate::tasks::{Failure, Kind};
 
-/// The lowest and highest value of a signal, and those before a reset.
+/// The lowest and highest value of a signal, also before a reset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MinMax {
     /// The values now.
@@ -33,7 +33,7 @@ pub struct Extremes {
     pub highest: Option<ValueWithUnit>,
 }
 
-/// The lowest and the highest value of every signal that has them.
+/// The lowest and the highest value of every signal with these objects.
 ///
 /// # Errors
 /// [`SettingsFailure::NoMinMax`]; no answer.
@@ -67,8 +67,8 @@ fn extremes(
     Ok(Extremes { node: node.id, signal: signal.name.clone(), lowest, highest })
 }
 
-/// Resets minimum and maximum of every signal that has them; the values before and after. The signature is sent once. If
-/// no answer comes, the values prove whether the device acted on it.
+/// Resets minimum and maximum of every signal with these objects. Returns the values before and after. The signature is
+/// sent once. If no answer comes, the values prove whether the device executed it.
 ///
 /// # Errors
 /// [`SettingsFailure::NoMinMaxReset`], [`SettingsFailure::MinMaxNotReset`]; the device rejects the signature or does not
@@ -90,7 +90,7 @@ pub fn reset(master: &mut Master<'_>, node: &Node) -> Result<Vec<MinMax>, Failur
         let now = extremes(master, node, signal, objects)?;
         match is_reset(&old, &now) {
             Some(true) => {}
-            // The missing answer is the better explanation.
+            // Report the missing answer, which is the better explanation.
             None | Some(false) if sent.is_err() => drop(sent?),
             None => {}
             Some(false) => {
@@ -103,8 +103,8 @@ pub fn reset(master: &mut Master<'_>, node: &Node) -> Result<Vec<MinMax>, Failur
     Ok(all)
 }
 
-/// Whether the values prove a reset: without it the lowest value only falls and the highest value only rises. `None` if
-/// they prove nothing: the values were equal before, or both ends have been exceeded since.
+/// Whether the values prove a reset. Without a reset, the lowest value only falls and the highest value only rises.
+/// `None` without proof: the values were equal before, or both were exceeded since then.
 fn is_reset(old: &Extremes, now: &Extremes) -> Option<bool> {
     let ends = |extremes: &Extremes| {
         let (lowest, highest) = extremes.lowest.zip(extremes.highest)?;

@@ -94,7 +94,7 @@ pub(super) fn range(
     Some((end_of_range(start)?, end_of_range(end)?))
 }
 
-/// The bit rate to which the device is set, if an object contains its code (MH-4 2321h).
+/// The bit rate setting of the device, if an object contains its code (MH-4 2321h).
 pub(super) fn bit_rate(node: &Node, values: &BTreeMap<ObjectId, Value>) -> Option<u32> {
     let model = node.model.as_ref()?;
     let code = values.get(&model.dictionary.find("bit-rate")?.object)?.as_u64()?;

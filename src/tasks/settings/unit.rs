@@ -1,4 +1,4 @@
-//! The physical unit of a signal (6131h), and the objects that a new unit rescales.
+//! The physical unit of a signal (6131h), and the objects that are converted to a new unit.
 
 use super::{SettingsFact, SettingsFailure, ValueWithUnit, find_signal, measured_quantity, read_each, set_object};
 use crate::canopen::id::NodeId;
@@ -51,14 +51,14 @@ pub struct Rescaled {
     pub before: Option<ValueWithUnit>,
     /// Its value in the new unit.
     pub after: Option<ValueWithUnit>,
-    /// Whether the device kept the number, so that it means something else now.
+    /// Whether the device kept the number, so that its meaning has changed.
     pub stale: bool,
 }
 
-/// How a number in the unit of a signal changes with the unit.
+/// The kind of conversion of a number if the unit of its signal changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scale {
-    /// A measured_quantity value, which changes by itself.
+    /// A measured value, which changes by itself.
     Moving,
     /// A point on the scale.
     Point,
@@ -80,7 +80,7 @@ const IN_UNIT: [(u16, Scale); 10] = [
     (0x136, Scale::Distance),
 ];
 
-/// The unit of one signal, or of every signal that has one.
+/// The unit of one signal, or of every signal with a unit.
 ///
 /// # Errors
 /// No such signal; [`SettingsFailure::NoUnit`].
@@ -108,11 +108,11 @@ fn unit_of(node: &Node, signal: &Signal) -> Option<UnitOf> {
     })
 }
 
-/// Sets the unit of a signal, or of the only signal that can have it. Reads it back with everything that it rescales.
+/// Sets the unit of a signal, or of the only suitable signal. Reads back the unit and all converted objects.
 ///
 /// # Errors
-/// The device does not accept the unit (known from its description, or from its answer), does not answer, or keeps
-/// another unit.
+/// The device does not accept the unit (according to its description or its answer), does not answer, or keeps another
+/// unit.
 pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit: Unit) -> Result<UnitChange, Failure> {
     let signal = choose(node, signal, unit)?.clone();
     let object = ObjectId::new(0x6131, signal.channel);
@@ -148,7 +148,7 @@ pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit:
     if let Some(kept) = node.signals.iter_mut().find(|kept| kept.name == signal.name) {
         *kept = renewed;
     }
-    // The new unit is set. Without these warnings it is a success as well.
+    // The new unit is set, so a failure to get these warnings is ignored.
     notes.extend(Note::may_clip(node.id, narrow_values(master, node).unwrap_or_default()));
     Ok(UnitChange { before: old.unit, now: UnitOf { unit, ..old }, rescaled, notes })
 }
@@ -166,7 +166,7 @@ fn check_accepted(node: &Node, old: &UnitOf, unit: Unit) -> Result<(), Failure> 
     Ok(())
 }
 
-/// The decimal digits, read again: they may change with the unit.
+/// Reads the decimal digits again, because they may change with the unit.
 fn digits(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Option<u8>, Failure> {
     let object = ObjectId::new(0x6132, signal.channel);
     let value = if node.may_have(object) { read_each(master, node, &[object])?.pop().flatten() } else { None };
@@ -179,7 +179,7 @@ pub fn list(units: &[Unit]) -> String {
     units.iter().map(Unit::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Whether the unit of a signal is one of the same quantity.
+/// Whether the unit of a signal has the same quantity.
 pub fn is_alike(signal: &Signal, unit: Unit) -> bool {
     signal.unit.is_some_and(|present| present.convert(0.0, unit).is_some())
 }
@@ -199,7 +199,7 @@ fn choose<'a>(node: &'a Node, name: Option<&str>, unit: Unit) -> Result<&'a Sign
 fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, Scale)> {
     let channel = signal.channel;
     let has_description = node.model.as_ref().is_some_and(|model| !model.dictionary.is_empty());
-    // Without a description only the family of the process value is read.
+    // Without a description, only the family of the process value is read.
     let own = signal.value_object.0.index & 0xf000;
     let families = [0x6000, 0x7000, 0x8000, 0x9000].into_iter().filter(|&family| has_description || family == own);
     let standard = IN_UNIT.into_iter().flat_map(move |(low, scale)| {
@@ -223,7 +223,7 @@ fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, Scale)> {
     all
 }
 
-/// Whether a number is unchanged although the new unit requires another number.
+/// Whether a number is unchanged, although the new unit requires another number.
 fn is_stale(before: ValueWithUnit, after: ValueWithUnit, scale: Scale) -> bool {
     let (Some(from), Some(to)) = (before.unit, after.unit) else { return false };
     let (was, is) = (before.number.as_f64(), after.number.as_f64());

@@ -9,7 +9,7 @@ use crate::tasks::Kind;
 /// Settings were not stored or restored.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StoreFailure {
-    /// According to 1010h or 1011h the device does not support the command.
+    /// According to 1010h or 1011h, the device does not support the command.
     NotOnCommand {
         /// The command.
         verb: Verb,
@@ -25,7 +25,7 @@ pub enum StoreFailure {
         /// The abort code.
         code: AbortCode,
     },
-    /// The device rejects reading its capability.
+    /// The device rejects the read of its capability.
     CapabilityUnreadable {
         /// The command.
         verb: Verb,
@@ -70,7 +70,7 @@ impl StoreFailure {
 /// The completed steps of a failed store or restore.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StoreEffect {
-    /// The signature was sent once. It is unknown whether the device acted on it.
+    /// The signature was sent once. It is unknown whether the device executed it.
     SignatureSent {
         /// The command.
         verb: Verb,
@@ -79,9 +79,9 @@ pub enum StoreEffect {
     },
     /// Whether the device answers other requests after the signature.
     Answers(bool),
-    /// These groups were stored before.
+    /// These groups were stored before the failure.
     Stored(Vec<Group>),
-    /// The device acknowledged the signature, and its effect was not verified.
+    /// The device acknowledged the signature, but its effect was not verified.
     NotVerified(Verb),
 }
 
@@ -90,14 +90,14 @@ pub enum StoreEffect {
 pub enum StoreFact {
     /// These groups are stored instead of all, which would reset these COB-IDs. A value is `None` if it cannot be read.
     InsteadOfAll(Vec<(ObjectId, Option<u64>)>),
-    /// Only the group of all settings stores these.
+    /// Only the group of all settings stores these settings.
     OnlyInAll(Vec<String>),
     /// The device does not store these settings, and they are not at their defaults.
     NotStored(Vec<Snapshot>),
     /// The defaults are used after the next reset.
     AfterReset(Group),
-    /// The device was reset, and no setting could be compared.
+    /// The device was reset, but no setting could be compared.
     NothingCompared,
-    /// The settings have the same values as before, and these are not their usual defaults.
+    /// The settings have the same values as before, which are not their usual defaults.
     Unchanged(Vec<Snapshot>),
 }

@@ -28,14 +28,14 @@ const STORE_TIMEOUT: Duration = Duration::from_secs(3);
 /// A command for the settings of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verb {
-    /// Store them.
+    /// Store the settings.
     Store,
     /// Restore the factory defaults.
     Restore,
 }
 
 impl Verb {
-    /// The object that takes the command for a group: 1010h or 1011h.
+    /// The object for the command of a group: 1010h or 1011h.
     pub fn object(self, group: Group) -> ObjectId {
         let index = match self {
             Verb::Store => 0x1010,
@@ -88,7 +88,7 @@ impl Group {
         }
     }
 
-    /// Whether it contains the settings that a description marks with `stored`.
+    /// Whether the group contains settings with this value of `stored` in a description.
     fn contains(self, stored: &str) -> bool {
         self == Group::All || self.as_str() == stored
     }
@@ -97,7 +97,7 @@ impl Group {
 /// The proof that a command was carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verified {
-    /// The device acknowledged it.
+    /// The device acknowledged the command.
     Ack,
     /// The device was reset and read again.
     Reset,
@@ -141,7 +141,7 @@ pub struct StorePlan {
     notes: Vec<Note>,
 }
 
-/// Finds out which groups must be stored for `group`, and which settings the device does not store. Only reads.
+/// Determines which groups must be stored for `group`, and which settings the device does not store. Only reads.
 ///
 /// # Errors
 /// The device does not store this group on command; no answer, protocol errors, bus errors and Ctrl-C.
@@ -176,8 +176,9 @@ pub fn plan(master: &mut Master<'_>, device: &Node, group: Group) -> Result<Stor
 /// all settings that it stores must have the same values as before.
 ///
 /// # Errors
-/// The device does not store on command, rejects the command or does not answer; settings that it did not keep; bus
-/// errors and Ctrl-C. The effects list the groups that were stored before.
+/// - The device does not store on command, rejects the command or does not answer.
+/// - Settings were not kept.
+/// - Bus errors and Ctrl-C.
 pub fn store(master: &mut Master<'_>, device: &Node, group: Group, verify: bool) -> Result<StoreReport, Failure> {
     let plan = plan(master, device, group)?;
     carry_out(master, device, plan, verify)
@@ -295,7 +296,7 @@ pub(super) fn send(master: &mut Master<'_>, device: &Node, verb: Verb, group: Gr
     }
 }
 
-/// Whether the device answers another request; `None` if that cannot be found out.
+/// Whether the device answers another request; `None` if this cannot be determined.
 fn answers(master: &mut Master<'_>, device: &Node) -> Option<bool> {
     let answer = master.read(device.id, ObjectId::DEVICE_TYPE, DataType::Unsigned(4)).ok()?;
     Some(!matches!(answer, Err(SdoError { failure: SdoFailure::NoAnswer { .. }, .. })))

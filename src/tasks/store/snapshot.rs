@@ -1,4 +1,4 @@
-//! The settings that a device keeps over a reset: which objects these are, their values, and the reset itself.
+//! The settings that a device keeps after a reset: their objects and values, and the reset itself.
 
 use super::Group;
 use crate::canopen::id::NodeId;
@@ -12,7 +12,7 @@ use crate::node::{Node, state};
 use crate::tasks::note::StateEffect;
 use crate::tasks::{Effect, Fact, Failure, Note};
 
-/// Settings of CiA 301 and CiA 404. They are read if the description does not list the stored settings.
+/// Settings of CiA 301 and CiA 404, which are read if the description does not list the stored settings.
 const COMMUNICATION: [u16; 11] =
     [0x1005, 0x1006, 0x1007, 0x100c, 0x100d, 0x1012, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
 const APPLICATION: [u16; 14] =
@@ -41,7 +41,7 @@ impl Snapshot {
     }
 }
 
-/// The objects of the description; `None` if it does not state which of them the device stores.
+/// The objects of the description; `None` if the description does not list the stored objects.
 fn described(device: &Node) -> Option<&[ObjectEntry]> {
     let entries = &device.model.as_ref()?.description.objects;
     entries.iter().any(|entry| entry.stored.is_some()).then_some(entries)
@@ -53,7 +53,7 @@ pub(in crate::tasks) fn objects(device: &Node, groups: &[Group]) -> Vec<ObjectId
     if let Some(entries) = described(device) {
         return entries
             .iter()
-            // Node-ID and bit rate are stored by their own signature, and read as the future value.
+            // Node-ID and bit rate are stored by their own signature, and reading them returns the future value.
             .filter(|entry| entry.signature.is_none() && entry.access.is_readable())
             .filter(|entry| entry.stored.is_some_and(|group| is_included(group.as_str())))
             .flat_map(|entry| entry.objects())
@@ -74,7 +74,7 @@ pub(in crate::tasks) fn objects(device: &Node, groups: &[Group]) -> Vec<ObjectId
     objects
 }
 
-/// Reads objects. Those that the device rejects are omitted.
+/// Reads objects. Rejected objects are omitted.
 ///
 /// # Errors
 /// No answer, protocol errors, bus errors and Ctrl-C.
@@ -103,7 +103,7 @@ pub(in crate::tasks) fn take(
     Ok(settings)
 }
 
-/// The settings that the device does not store according to its description, and that differ from their defaults.
+/// The settings that the device does not store (according to its description) and that differ from their defaults.
 ///
 /// # Errors
 /// As [`take`].
@@ -112,7 +112,7 @@ pub(super) fn not_stored(master: &mut Master<'_>, device: &Node) -> Result<Vec<S
     let objects: Vec<ObjectId> = entries
         .iter()
         .filter(|entry| entry.access == Access::Rw && entry.signature.is_none() && entry.stored.is_none())
-        // The device itself writes this object: it is not a setting.
+        // The device itself writes this object, so it is not a setting.
         .filter(|entry| entry.name != "error-count")
         .flat_map(|entry| entry.objects())
         .collect();
@@ -126,7 +126,7 @@ pub(in crate::tasks) fn default(device: &Node, object: ObjectId) -> Option<Vec<u
     device.model.as_ref()?.dictionary.get(object)?.default_bytes(device.id)
 }
 
-/// Whether the manual gives the default of an object, and it is the same for all devices.
+/// Whether the manual contains the default of an object, and the default is the same for all devices.
 pub(in crate::tasks) fn is_default_certain(device: &Node, object: ObjectId) -> bool {
     let Some(entries) = described(device) else { return false };
     entries.iter().find(|entry| entry.at.contains(object)).is_some_and(|entry| entry.doubt.is_empty())

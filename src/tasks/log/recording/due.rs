@@ -1,4 +1,4 @@
-//! Counts the values that were due after a SYNC or a remote request and did not arrive.
+//! Counts the values that were due after a SYNC or a remote request but did not arrive.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
@@ -13,11 +13,11 @@ use std::time::Duration;
 /// A TPDO that is sent at every n-th SYNC, or on each remote request.
 #[derive(Debug, Default)]
 struct DueTpdo {
-    /// n, 1 to 240.
+    /// The number n, 1 to 240.
     every: u8,
     /// The values of the TPDO that are recorded.
     values: u64,
-    /// SYNC messages whose cycle is over.
+    /// SYNC messages whose cycle has ended.
     syncs: u64,
     /// Frames received in these cycles.
     received: u64,
@@ -29,12 +29,12 @@ struct DueTpdo {
 #[derive(Debug, Default)]
 pub(super) struct DueTpdos {
     tpdos: BTreeMap<CanId, DueTpdo>,
-    /// The last SYNC, while its cycle is not over.
+    /// The last SYNC, until its cycle ends.
     last: Option<Mono>,
 }
 
 impl DueTpdos {
-    /// Takes the present setup of the nodes. The counts stay.
+    /// Uses the present setup of the nodes. The counts are kept.
     pub(super) fn set_up(&mut self, nodes: &[Node], decoder: &Decoder, mode: Mode) {
         for tpdo in nodes.iter().flat_map(|node| &node.tpdos).filter(|tpdo| tpdo.cob_id.is_valid()) {
             let every = match (mode, tpdo.transmission) {
@@ -50,14 +50,14 @@ impl DueTpdos {
         }
     }
 
-    /// A SYNC is sent at `at`: the cycle of the previous one is over.
+    /// A SYNC is sent at `at`. This ends the previous cycle.
     pub(super) fn sync(&mut self, at: Mono) {
         if self.last.replace(at).is_some() {
             self.end_cycle();
         }
     }
 
-    /// Takes a frame.
+    /// Handles a frame.
     pub(super) fn frame(&mut self, frame: &Frame) {
         if let Some(due) = self.tpdos.get_mut(&frame.id()).filter(|_| !frame.is_remote()) {
             due.current += 1;
@@ -71,7 +71,7 @@ impl DueTpdos {
         }
     }
 
-    /// The number of values that were due by `end` and did not arrive.
+    /// The number of values that were due by `end` but did not arrive.
     pub(super) fn missing(mut self, end: Mono, interval: Duration) -> u64 {
         if self.last.is_some_and(|last| end.since(last) >= interval) {
             self.end_cycle();

@@ -36,17 +36,17 @@ struct Recent {
 /// A change of the overload of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum OverloadChange {
-    /// An overload of this channel; `None` if the emergency names no channel.
+    /// An overload of this channel begins; `None` if the emergency contains no channel.
     Begins(Option<u8>),
-    /// It is over.
+    /// The overload ends.
     Ends,
 }
 
-/// Identical emergencies are reported once, then as one count in this time.
+/// Identical emergencies are reported once, and then as a count per this interval.
 const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Emergencies {
-    /// Takes the COB-ID (1014h) and the description of a node, instead of those known before.
+    /// Replaces the COB-ID (1014h) and the description of a node.
     pub(super) fn watch(&mut self, node: &Node) {
         let id = node.id;
         self.nodes.retain(|_, of| *of != id);
@@ -80,7 +80,7 @@ impl Emergencies {
         self.repeating.get_mut(&node).is_some_and(|last| last.replace(emergency) == Some(emergency))
     }
 
-    /// Takes an emergency. Returns whether it is reported now; if not, it is counted.
+    /// Handles an emergency. Returns whether to report it now; if not, it is counted.
     pub(super) fn is_new(&mut self, node: NodeId, emergency: Emergency, now: Mono) -> bool {
         let mut recent = self.recent.iter_mut();
         if let Some(recent) = recent.find(|recent| recent.node == node && recent.emergency == emergency) {
@@ -100,8 +100,8 @@ impl Emergencies {
         Some((recent.node, recent.emergency, std::mem::take(&mut recent.count)))
     }
 
-    /// The meaning of an emergency code on this node, and the bits of its error register in words, unless the device
-    /// always sends the same register with this code.
+    /// The meaning of an emergency code on this node. Also the set bits of its error register, unless the device always
+    /// sends the same register with this code.
     pub(super) fn meaning(&self, node: NodeId, emergency: Emergency) -> String {
         let description = self.models.get(&node).map(|model| &model.description);
         let described = description.and_then(|description| description.emergency(emergency.code));
@@ -115,14 +115,14 @@ impl Emergencies {
         emergency.register.map(words).map_or(text.clone(), |words| format!("{text}, {words}"))
     }
 
-    /// The overload of its node that an emergency reports.
+    /// The change of an overload that an emergency reports.
     pub(super) fn overload(&self, node: NodeId, emergency: Emergency) -> Option<OverloadChange> {
         let description = &self.models.get(&node)?.description;
         if emergency.code != 0 {
             let entry = description.emergency(emergency.code).filter(|entry| entry.overload)?;
             return Some(OverloadChange::Begins(entry.channel(emergency.manufacturer)));
         }
-        // Another error may be the one that is over.
+        // The ended error may be a different one.
         let pending = description.overload_register().zip(emergency.register);
         let is_pending = pending.is_some_and(|(bits, register)| register.0 & bits == bits);
         (!is_pending).then_some(OverloadChange::Ends)
@@ -161,7 +161,7 @@ mod tests {
         let mut reported = Vec::new();
         for step in 0..1000 {
             let now = at(step * 2);
-            // Two alternating emergencies are limited as well.
+            // Alternating emergencies are also limited.
             let emergency = if step % 2 == 0 { one } else { other };
             if emergencies.is_new(node, emergency, now) {
                 reported.push(0);

@@ -1,4 +1,4 @@
-//! Incidents during a recording, and how it continues.
+//! Handles incidents during a recording.
 
 use super::Recording;
 use super::emergencies::OverloadChange;
@@ -23,7 +23,7 @@ impl Recording<'_> {
         }
     }
 
-    /// Takes the overloads that the nodes reported before the recording.
+    /// Adopts the overloads that the nodes reported before the recording.
     pub(in crate::tasks::log) fn take_overloads(&mut self) {
         self.nodes.iter().for_each(|node| self.decoder.set_overload(node.id, node.has_overload));
     }
@@ -38,13 +38,13 @@ impl Recording<'_> {
         narrow.into_iter().for_each(|remark| self.remark(remark, at, observer));
     }
 
-    /// Reports something now and in the summary.
+    /// Reports an observation now and in the summary.
     fn remark(&mut self, remark: Remark, at: Stamp, observer: &mut dyn Observer) {
         observer.event(&LogEvent::Remark(remark.clone()), at);
         self.remarks.push(remark);
     }
 
-    /// Takes a frame that is not a TPDO.
+    /// Handles a frame that is not a TPDO.
     pub(super) fn other_frame(&mut self, received: &Received, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let (frame, at) = (&received.frame, received.at);
         if let Some((node, emergency)) = self.emergencies.parse(frame) {
@@ -98,7 +98,7 @@ impl Recording<'_> {
         }
     }
 
-    /// Takes a heartbeat or boot-up message.
+    /// Handles a heartbeat or boot-up message.
     fn life(&mut self, node: NodeId, life: Life, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let is_boot_up = life == Life::BootUp;
         if is_boot_up {
@@ -139,7 +139,7 @@ impl Recording<'_> {
         self.request_reread(node, RereadReason::Disconnected, at.mono, master);
     }
 
-    /// Takes the nodes that restarted between their survey and the recording.
+    /// Handles nodes that restarted between their survey and the recording.
     pub(in crate::tasks::log) fn restarted_before_start(
         &mut self,
         nodes: &BTreeSet<NodeId>,
@@ -154,14 +154,14 @@ impl Recording<'_> {
         }
     }
 
-    /// Requests that the setup of a node is read again. Until then its frames make no rows. A passive recording cannot
-    /// read.
+    /// Requests that the setup of a node is read again. Until then its frames are ignored. A passive recording sends no
+    /// reads.
     fn request_reread(&mut self, node: NodeId, why: RereadReason, now: Mono, master: &mut Master<'_>) {
         let is_recorded = self.listener.is_none() && self.nodes.iter().any(|known| known.id == node);
         if !is_recorded || !self.rereads.request(node, why, now, master) {
             return;
         }
-        // After a wrong length, frames with the right length still make rows: they fit the known mapping.
+        // After a wrong length, frames with the right length are still recorded, because they fit the known mapping.
         if !matches!(why, RereadReason::WrongLength | RereadReason::FramesLost) {
             self.decoder.pause(node);
             if let Some(poll) = &mut self.poll {
@@ -175,7 +175,7 @@ impl Recording<'_> {
         nodes.into_iter().for_each(|node| self.request_reread(node, why, now, master));
     }
 
-    /// Nothing could be received until now: boot-ups may have been missed.
+    /// Handles the end of a time without reception. Boot-up messages may be lost.
     fn reception_resumed(&mut self, now: Mono, master: &mut Master<'_>) {
         self.liveness.restart_all(now);
         self.request_all_rereads(RereadReason::Disconnected, now, master);
@@ -190,13 +190,13 @@ impl Recording<'_> {
         self.request_all_rereads(RereadReason::FramesLost, at.mono, master);
     }
 
-    /// A TPDO of a node whose setup is uncertain.
+    /// Counts a TPDO of a node whose setup is uncertain.
     pub(super) fn not_recorded(&mut self, node: NodeId, now: Mono) {
         self.tally.events.not_recorded += 1;
         self.liveness.restart(node, now);
     }
 
-    /// A TPDO arrived more often than at each SYNC. If the values differ, it makes no rows any more.
+    /// Handles a TPDO that arrived more than once per SYNC. If the values differ, the TPDO is ignored from now on.
     pub(super) fn surplus(&mut self, surplus: Surplus, at: Stamp, observer: &mut dyn Observer) -> ControlFlow<()> {
         let Surplus { node, number, differs, is_new } = surplus;
         if !is_new {
@@ -212,11 +212,11 @@ impl Recording<'_> {
         self.early.retain(|samples| samples.iter().all(|sample| sources[sample.source].node != node));
         self.liveness.remove(node);
         self.decoder.pause(node);
-        // Without another node there is nothing left to record.
+        // If no other node is left, the recording ends.
         if self.liveness.nodes().next().is_none() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// A TPDO has another length than its mapping.
+    /// Handles a TPDO whose length differs from its mapping.
     pub(super) fn wrong_length(
         &mut self,
         node: NodeId,
@@ -226,7 +226,7 @@ impl Recording<'_> {
     ) {
         self.tally.events.wrong_lengths += 1;
         self.request_reread(node, RereadReason::WrongLength, at.mono, master);
-        // A longer TPDO may be used once its mapping was read again.
+        // A longer TPDO may be used after its mapping was read again.
         let may_be_used = |mapped, received| received > mapped && self.rereads.is_pending(node);
         if let Some((mapped, received)) = self.decoder.wrong_length(node)
             && !may_be_used(mapped, received)
@@ -236,7 +236,7 @@ impl Recording<'_> {
         }
     }
 
-    /// Takes the result of a transfer of a reread.
+    /// Handles the result of a transfer of a reread.
     pub(super) fn read_again(
         &mut self,
         ticket: Ticket,
@@ -301,7 +301,7 @@ impl Recording<'_> {
         Ok(())
     }
 
-    /// Takes an answer to a question to a silent node. After the last one, the reasons are reported.
+    /// Handles an answer of a silent node. After the last answer, the reasons are reported.
     pub(super) fn take_finding(
         &mut self,
         ticket: Ticket,

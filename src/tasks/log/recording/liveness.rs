@@ -1,4 +1,4 @@
-//! Which of the recorded nodes still send.
+//! Tracks which of the recorded nodes still send.
 
 use super::super::heartbeats::{HeartbeatChange, HeartbeatMonitor};
 use super::super::interval::IntervalTracker;
@@ -22,9 +22,9 @@ pub(super) struct Liveness {
 #[derive(Debug, Default)]
 struct NodeLiveness {
     samples: IntervalTracker,
-    /// Reported as silent, until the next sample.
+    /// Whether the node was reported as silent, until its next sample.
     is_silent: bool,
-    /// It sends only on change: silence proves nothing while its heartbeat shows OPERATIONAL.
+    /// Whether the node sends only on change. Its silence is normal while its heartbeat shows OPERATIONAL.
     sends_on_change: bool,
 }
 
@@ -58,26 +58,26 @@ impl Liveness {
         }
     }
 
-    /// Takes samples of a node. Returns whether it had been reported as silent.
+    /// Handles samples of a node. Returns whether the node was reported as silent.
     pub(super) fn take_samples(&mut self, node: NodeId, at: Mono) -> bool {
         let liveness = self.nodes.entry(node).or_default();
         liveness.samples.add(at, None);
         std::mem::take(&mut liveness.is_silent)
     }
 
-    /// Takes a heartbeat or boot-up message.
+    /// Handles a heartbeat or boot-up message.
     pub(super) fn take_life(&mut self, node: NodeId, life: Life, at: Mono) -> HeartbeatChange {
         self.heartbeats.take(node, life, at)
     }
 
-    /// Nothing of this node could be recorded until now.
+    /// Restarts the silence of a node, because nothing could be recorded until now.
     pub(super) fn restart(&mut self, node: NodeId, now: Mono) {
         if let Some(liveness) = self.nodes.get_mut(&node) {
             liveness.samples.restart(now);
         }
     }
 
-    /// Nothing could be received until now.
+    /// Restarts the silence of all nodes, because nothing could be received until now.
     pub(super) fn restart_all(&mut self, now: Mono) {
         self.nodes.values_mut().for_each(|liveness| liveness.samples.restart(now));
         self.heartbeats.restart(now);
@@ -116,7 +116,7 @@ impl Liveness {
     }
 }
 
-/// Whether a node sends its TPDOs only on change: none has an event timer, and none is sent on every SYNC.
+/// Whether a node sends its TPDOs only on change, without an event timer or SYNC.
 fn sends_on_change(node: &Node, mode: Mode) -> bool {
     let mut valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).peekable();
     let is_due = |tpdo: &Tpdo| match tpdo.transmission {

@@ -57,7 +57,7 @@ impl Recording<'_> {
         }
     }
 
-    /// The nodes with values that were operational, and whose last heartbeat shows another state.
+    /// The nodes with values that left OPERATIONAL according to their last heartbeat.
     fn not_operational(&self) -> Vec<Remark> {
         let remark = |node: NodeId| {
             let heard = self.heard.get(&node)?;
@@ -74,7 +74,7 @@ impl Recording<'_> {
         self.liveness.nodes().filter_map(remark).collect()
     }
 
-    /// Why nodes, or signals of nodes that sent others, have no values.
+    /// The reasons why nodes or single signals have no values.
     pub(super) fn silence_remarks(&self) -> Vec<Remark> {
         let silent = self.silent().into_iter().filter_map(|silent| {
             let signal = match silent {

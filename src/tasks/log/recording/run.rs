@@ -11,18 +11,19 @@ use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, LogEvent, Mode, Observer, TICK};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// How often it is checked whether the starts of the nodes were sent.
+/// The interval of checks whether the start commands were sent.
 const START_CHECK_INTERVAL: Duration = Duration::from_millis(1);
 
-/// How long the values of the first SYNC are kept back: a second device with the same COB-ID answers within this time.
+/// The time for which the values of the first SYNC are kept. A second device with the same COB-ID answers within this
+/// time.
 const SECOND_SENDER_TIMEOUT: Duration = Duration::from_millis(50);
 
-/// When the loop has something to do, besides frames, polls and SYNC.
+/// Times at which the loop must act, besides frames, polls and SYNC.
 struct Schedule {
     start: Mono,
     /// The end of `--duration`.
     end: Option<Mono>,
-    /// The recording ends here if it has no row.
+    /// The recording ends at this moment if it has no row.
     give_up: Mono,
     next_tick: Mono,
     /// After Ctrl-C: frames received until this moment are still recorded.
@@ -31,7 +32,7 @@ struct Schedule {
 
 impl Schedule {
     fn new(start: Mono, duration: Option<Duration>, is_live: bool) -> Schedule {
-        // A recording that is played back may contain other traffic for any time, and has an end of its own.
+        // A replayed recording may contain other traffic for any time, and has its own end.
         let timeout = if is_live { FIRST_SAMPLE_TIMEOUT } else { Duration::MAX };
         Schedule {
             start,
@@ -42,7 +43,7 @@ impl Schedule {
         }
     }
 
-    /// The recording starts later by this time. So `--duration` contains the same number of cycles.
+    /// Delays the start of the recording, so that `--duration` contains the same number of cycles.
     fn delay(&mut self, by: Duration) {
         self.start = self.start + by;
         self.end = self.end.map(|end| end + by);
@@ -87,7 +88,7 @@ impl Recording<'_> {
         let schedule = Schedule::new(start, self.options.duration, master.bus().is_live());
         let mut recorder = Loop { recording: self, schedule, producer: producer.as_mut(), observer };
         let result = wait::run(master, Policy::Record, &mut recorder);
-        // The reader may have closed the output, which ends the recording anyway.
+        // If the reader has closed the output, the recording ends anyway.
         let _ = self.take_early(observer);
         self.timestamps = master.bus().timestamps();
         if let Some(producer) = producer {
@@ -137,7 +138,7 @@ impl Recording<'_> {
         }
         if let Some(producer) = producer.filter(|producer| now >= producer.due()) {
             if producer.slot() == 0 && master.is_sending() {
-                // A SYNC must not overtake the starts of the nodes: the first TPDOs would be missing.
+                // A SYNC must not be sent before the start commands, or the first TPDOs would be missing.
                 schedule.delay(START_CHECK_INTERVAL);
                 producer.delay_start(now + START_CHECK_INTERVAL);
                 return ControlFlow::Continue(());
@@ -189,7 +190,8 @@ impl Recording<'_> {
         }
     }
 
-    /// Ctrl-C. After the first one, the frames received before it are still recorded. The second one does not wait.
+    /// Handles Ctrl-C. After the first Ctrl-C, frames received before are still recorded. A second one ends
+    /// immediately.
     fn interrupt(&mut self, schedule: &mut Schedule, master: &Master<'_>) -> Result<ControlFlow<()>, Error> {
         let is_second = std::mem::replace(&mut self.interrupted, true);
         if self.tally.rows == 0 && self.early.is_empty() {

@@ -11,9 +11,9 @@ use std::time::Duration;
 /// The counts of a recording so far.
 #[derive(Debug)]
 pub(super) struct Tally {
-    /// Per source.
+    /// The statistics per source.
     statistics: Vec<Statistics>,
-    /// Per source. Gaps are counted at the first value of a TPDO or poll.
+    /// The intervals per source. Gaps are counted at the first value of a TPDO or poll.
     intervals: Vec<IntervalTracker>,
     /// Values recorded.
     pub(super) rows: u64,
@@ -50,7 +50,7 @@ impl Tally {
         }
     }
 
-    /// Makes room for all sources. A signal with a new unit keeps its usual interval.
+    /// Adds entries for all sources. A signal with a new unit keeps its usual interval.
     pub(super) fn set_sources(&mut self, sources: &[Source]) {
         self.statistics.resize(sources.len(), Statistics::default());
         for source in sources.iter().skip(self.intervals.len()) {
@@ -87,7 +87,7 @@ impl Tally {
         self.end = self.end.max(at);
     }
 
-    /// Ends the recording with its last row. Frames that were received before the start may contain all rows.
+    /// Ends the recording at its last row. All rows may come from frames received before the start.
     pub(super) fn end_at(&mut self, at: Mono) {
         self.end = at;
     }
@@ -102,8 +102,8 @@ impl Tally {
         self.first.map_or(Duration::ZERO, |first| self.end.since(first))
     }
 
-    /// The statistics of each source. A source without samples is left out if its signal has a later one: its unit
-    /// was then not known yet.
+    /// The statistics of each source. A source without samples is omitted if its signal has a later source, because its
+    /// unit was unknown at first.
     pub(super) fn into_statistics(self, sources: &[Source]) -> Vec<(Source, Statistics)> {
         let is_replaced = |at: usize| sources[at + 1..].iter().any(|later| is_same_signal(later, &sources[at]));
         let counted = self.statistics.into_iter().zip(sources).enumerate();
