@@ -3,7 +3,8 @@
 use super::pdo_map::{Fault, FaultyBus, is_write};
 use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::bus::{Bus, Event, Mono};
-use cangauge::canopen::id::NodeId;
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::device::catalog::by_name;
 use cangauge::device::config_file::Document;
 use cangauge::device::scalar::Scalar;
@@ -12,7 +13,7 @@ use cangauge::node::Overrides;
 use cangauge::output::config::write_toml;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Setup};
-use cangauge::tasks::config::{Applied, File, Journal, Options, Sections, Snapshot, apply, read};
+use cangauge::tasks::config::{Applied, File, Journal, Options, Sections, Snapshot, apply, read, resume};
 use cangauge::tasks::restore::restore;
 use cangauge::tasks::store::Group;
 use cangauge::tasks::{Failure, Kind};
@@ -49,14 +50,19 @@ const DEVICES: [(&str, &str); 4] = [
     ),
 ];
 
-struct NoJournal;
+/// A journal that outlives its program: the text of the old settings.
+#[derive(Default)]
+struct Kept(Option<String>);
 
-impl Journal for NoJournal {
-    fn begin(&mut self, _: &Snapshot) -> Result<(), Failure> {
+impl Journal for Kept {
+    fn begin(&mut self, before: &Snapshot) -> Result<(), Failure> {
+        self.0.get_or_insert_with(|| text(before));
         Ok(())
     }
 
-    fn finish(&mut self) {}
+    fn finish(&mut self) {
+        self.0 = None;
+    }
 }
 
 fn node(number: u8) -> NodeId {
@@ -82,22 +88,40 @@ fn snapshot(bus: &mut dyn Bus, number: u8) -> Result<Snapshot, Failure> {
     read(&mut master, node(number), &Overrides::new(), None)
 }
 
+/// The complete dump.
+fn text(snapshot: &Snapshot) -> String {
+    let mut text = Vec::new();
+    write_toml(&snapshot.dump(false), &mut text).expect("memory");
+    String::from_utf8(text).expect("text")
+}
+
 /// The dump without `[calibration]` and what differs between devices of one kind.
 fn dump(bus: &mut dyn Bus, number: u8) -> String {
-    let mut text = Vec::new();
-    write_toml(&snapshot(bus, number).expect("read").dump(false), &mut text).expect("memory");
-    let text = String::from_utf8(text).expect("text");
+    let text = text(&snapshot(bus, number).expect("read"));
     let text = text.split("\n[calibration]").next().unwrap_or_default().to_owned();
     let is_own = |line: &&str| !line.starts_with("node-id") && !line.starts_with("# revision");
     text.lines().filter(is_own).collect::<Vec<_>>().join("\n")
 }
 
 fn set(bus: &mut dyn Bus, number: u8, file: &str, options: &Options) -> Result<Applied, Failure> {
-    let document = Document::parse(file).expect("TOML");
+    set_with(bus, number, file, options, &mut Kept::default())
+}
+
+fn set_with(
+    bus: &mut dyn Bus,
+    number: u8,
+    file: &str,
+    options: &Options,
+    journal: &mut Kept,
+) -> Result<Applied, Failure> {
+    let mut document = Document::parse(file).expect("TOML");
+    if let Some(before) = &journal.0 {
+        resume(&mut document, &Document::parse(before).expect("TOML"));
+    }
     let mut master = Master::new(bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
     let now = read(&mut master, node(number), &Overrides::new(), Some(&File::Settings(document.clone())))?;
     let file = now.check(&document).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
-    apply(&mut master, now, &file, options, &Overrides::new(), &mut NoJournal)
+    apply(&mut master, now, &file, options, &Overrides::new(), journal)
 }
 
 fn stored() -> Options {
@@ -179,6 +203,51 @@ fn an_interrupted_apply_is_completed_by_the_next_one() {
                 }
                 set(&mut bus, NODE, file, &Options::default()).unwrap_or_else(|failure| panic!("{told}: {failure}"));
                 assert_eq!(dump(&mut bus, NODE), wanted, "{told}");
+            }
+        }
+    }
+}
+
+/// The program is killed before each frame that changes the device. The next run ends in the wanted state, and a
+/// rollback in the old one.
+#[test]
+fn a_killed_apply_is_completed_or_rolled_back() {
+    // A range is a condition, not a setting. The conversion to another unit and back may round it.
+    let settings = |bus: &mut MemoryBus| dump(bus, NODE).split_once("\n[address]").map(|(_, text)| text.to_owned());
+    let changes = |frame: &Frame| is_write(frame) || frame.id() == CanId::NMT;
+    for (device, file) in DEVICES {
+        // The DPS does not store its TPDO settings.
+        for options in [Options::default(), Options { reset: device != "dps", ..stored() }] {
+            let mut clean = FaultyBus::new(bus(device), Fault::None, 0);
+            let old = settings(&mut clean.bus);
+            set(&mut clean, NODE, file, &options).unwrap_or_else(|failure| panic!("{device}: {failure}"));
+            let wanted = settings(&mut clean.bus);
+            let frames = clean.sent.iter().enumerate().filter(|(_, frame)| changes(frame));
+            let frames = frames.skip_while(|(_, frame)| !is_write(frame));
+            // The frames before the store are those of the run without a store.
+            let stores = |frame: &Frame| frame.data().starts_with(&[0x23, 0x10, 0x10]);
+            for (at, frame) in frames.skip_while(|(_, frame)| options.store && !stores(frame)) {
+                let told = format!("{device} killed before {at}: {frame}");
+                // The MH-4 has every kind of setting. The other devices alternate.
+                for rolls_back in [false, true].into_iter().filter(|back| device == "mh4" || *back == (at % 2 == 0)) {
+                    let mut journal = Kept::default();
+                    let mut killed = FaultyBus::new(bus(device), Fault::Gone, at);
+                    set_with(&mut killed, NODE, file, &options, &mut journal).expect_err(&told);
+                    let mut bus = killed.bus;
+                    if rolls_back {
+                        let before = journal.0.clone().unwrap_or_else(|| panic!("{told}: no journal"));
+                        let sections = Sections { address: false, calibration: true };
+                        let options = Options { sections, ..options.clone() };
+                        set_with(&mut bus, NODE, &before, &options, &mut journal)
+                            .unwrap_or_else(|failure| panic!("{told}: rollback: {failure}"));
+                        assert_eq!(settings(&mut bus), old, "{told}");
+                    } else {
+                        set_with(&mut bus, NODE, file, &options, &mut journal)
+                            .unwrap_or_else(|failure| panic!("{told}: again: {failure}"));
+                        assert_eq!(settings(&mut bus), wanted, "{told}");
+                    }
+                    assert_eq!(journal.0, None, "{told}: the journal is removed after success");
+                }
             }
         }
     }

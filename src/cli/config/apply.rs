@@ -20,6 +20,7 @@ use crate::output::notes;
 use crate::tasks::config::diff::check_offline;
 use crate::tasks::config::{
     Applied, ConfigFailure, File, FileSettings, Line, Options, Sections, Snapshot, apply, check_device, lines, read,
+    resume,
 };
 use crate::tasks::{Failure, Kind, Note};
 use clap::Args;
@@ -264,12 +265,21 @@ impl Apply {
         master.listen_to(&[node]).map_err(|error| one(error.into()))?;
         let snapshot = read(master, node, overrides, job.file.as_ref()).map_err(one)?;
         let mut journal = FileJournal::new(master.bus().name(), &snapshot, global);
-        let (file, (document, found)) = match &job.file {
-            Some(file) => (job.label.clone(), file.document(&snapshot)),
-            None => {
-                let (file, text) = latest(master.bus().name(), &snapshot).map_err(one)?;
-                let unreadable = || Failure::at(node, ConfigFailure::Journal { reason: file.clone() });
-                let document = parse(&file, &text).map_err(|_| one(unreadable()))?;
+        let interrupted = latest(master.bus().name(), &snapshot).and_then(|(file, text)| {
+            let unreadable = || Failure::at(node, ConfigFailure::Journal { reason: file.clone() });
+            let document = parse(&file, &text).map_err(|_| unreadable())?;
+            Ok((file, document))
+        });
+        let (file, (document, found)) = match (&job.file, interrupted) {
+            (Some(file), interrupted) => {
+                let (mut document, found) = file.document(&snapshot);
+                if let Ok((_, before)) = interrupted {
+                    resume(&mut document, &before);
+                }
+                (job.label.clone(), (document, found))
+            }
+            (None, interrupted) => {
+                let (file, document) = interrupted.map_err(one)?;
                 (file, (document, Vec::new()))
             }
         };

@@ -55,6 +55,15 @@ impl File {
     }
 }
 
+/// Adds to a file what an interrupted run may have switched off for its writes: the PDOs and services that were on
+/// before it, unless the file itself names them.
+pub fn resume(document: &mut Document, before: &Document) {
+    let is_switch = |key: &str| key.ends_with(".enabled") || key.ends_with("-producer");
+    let switches = before.entries.iter().filter(|entry| is_switch(&entry.key));
+    let missing = switches.filter(|entry| document.entries.iter().all(|own| own.key != entry.key));
+    document.entries.extend(missing.cloned().collect::<Vec<_>>());
+}
+
 /// Reads all settings of a node, and further objects in a file.
 ///
 /// # Errors
