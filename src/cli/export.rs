@@ -1,13 +1,12 @@
 //! `cangauge export`.
 
 use super::args::Nodes;
-use super::exit::{several, stdout};
+use super::exit::{open_stdout, several, stdout};
 use super::{ErrorMessage, Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::output::dbc;
 use crate::tasks::export::messages;
 use clap::{Args, Subcommand};
-use std::io;
 
 /// Describe the TPDOs of nodes for other programs
 #[derive(Debug, Args)]
@@ -61,7 +60,7 @@ impl Export {
             }
         }
         if failures.len() < asked {
-            dbc::write(&messages, &mut io::stdout().lock()).map_err(stdout)?;
+            dbc::write(&messages, &mut open_stdout()?.lock()).map_err(stdout)?;
         }
         Ok(several(asked, failures)?)
     }

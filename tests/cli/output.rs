@@ -60,7 +60,8 @@ fn closed_descriptor_of_stdout_is_an_error() {
         command.args([env!("CARGO_BIN_EXE_cangauge"), "-b", &bench.bus]).args(line.split(' '));
         bench.finish(&mut command)
     };
-    let others = ["--help", "check 1 temperature<99", "log 1 --sync 10ms --count 1 -o /dev/stdout", "devices"];
+    let others =
+        ["--help", "check 1 temperature<99", "log 1 --sync 10ms --count 1 -o /dev/stdout", "devices", "export dbc 1"];
     for line in PRINTING.into_iter().chain(others) {
         let done = run(line).exit(8);
         let says = done.stderr.lines().any(|line| line.contains("write to stdout: it is closed"));
