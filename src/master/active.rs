@@ -29,7 +29,7 @@ pub(super) struct Active {
     /// The number of our frames that still wait to be sent.
     pub(super) unsent: usize,
     pub(super) attempts_left: u32,
-    /// How often a read that fails in the middle is restarted.
+    /// How often a transfer that fails in the middle is restarted.
     pub(super) restarts_left: u32,
     /// Whether a read was rejected because the node still had a transfer in progress. The read was repeated.
     pub(super) was_rejected: bool,
@@ -174,7 +174,7 @@ impl Active {
         out.push(self.machine.request());
     }
 
-    /// Restarts a read after this failure. `false` if a restart is not allowed or would not help. `out` contains the
+    /// Restarts a transfer after this failure. `false` if a restart is not allowed or would not help. `out` contains the
     /// abort for the server.
     pub(super) fn restart(
         &mut self,
@@ -185,7 +185,8 @@ impl Active {
     ) -> bool {
         let has_begun = self.machine.has_begun();
         let is_rejected = error == TransferError::Aborted(AbortCode::COMMAND_SPECIFIER);
-        if !has_begun && is_rejected && self.request.may_restart() && !self.was_rejected {
+        let is_read = self.request.operation() == Operation::Read;
+        if !has_begun && is_rejected && is_read && self.request.may_restart() && !self.was_rejected {
             // A server with an interrupted transfer rejects the first request, and accepts the next one.
             self.was_rejected = true;
         } else if has_begun && is_of_transmission(error) && self.restarts_left > 0 {

@@ -99,9 +99,9 @@ impl Request {
         self
     }
 
-    /// Whether a failed transfer may be restarted: only reads that the caller does not repeat.
+    /// Whether a failed transfer may be restarted. The download of a program may have had an effect.
     pub(super) fn may_restart(&self) -> bool {
-        self.repeatable && self.operation() == Operation::Read
+        self.repeatable && (self.operation() == Operation::Read || !(0x1f00..=0x1fff).contains(&self.object.index))
     }
 
     /// Whether the transfer continues without blocks if the device rejects them.
@@ -253,6 +253,9 @@ pub enum SdoFailure {
 
 fn lengths(announced: Option<u32>, delivered: usize) -> String {
     match announced {
+        Some(size) if u64::from(size) == delivered as u64 => {
+            format!("two reads delivered different lengths, the second one {delivered} bytes")
+        }
         Some(size) => format!("the device announced {size} bytes and delivered {delivered}"),
         None => format!("a segment before the last one is not full ({delivered} bytes were delivered)"),
     }
