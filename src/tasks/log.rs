@@ -278,7 +278,7 @@ pub fn log(
     let restored = recording.states.restore(master);
     recording.remarks.extend(recording.states.remark());
     if let Err(error) = restored {
-        recording.remarks.push(Remark::StatesNotRestored(Box::new(error.into())));
+        recording.remarks.push(Remark::StatesNotRestored(Box::new(error)));
     }
     Ok(RecordingReport { failed, ..finish(recording, result)? })
 }

@@ -2,6 +2,7 @@
 //! unit and decimal digits that the device had when it sent the frame.
 
 use super::Kept;
+use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
 use cangauge::bus::time::{Mono, Stamp};
 use cangauge::bus::{Bus, BusError, Event, Fault, Received};
@@ -140,6 +141,9 @@ fn plan(mode: Mode) -> LogOptions {
 #[derive(Default)]
 struct NmtRecorder {
     commands: Vec<String>,
+    /// The number of frames from a master before each command.
+    places: Vec<u64>,
+    sent: u64,
 }
 
 impl Station for NmtRecorder {
@@ -148,8 +152,10 @@ impl Station for NmtRecorder {
     fn receive(&mut self, _: Mono, frame: &Frame, _: &mut Outbox) {
         let text = frame.to_string();
         if text.starts_with("000#") {
-            self.commands.push(text);
+            self.places.push(self.sent);
+            self.commands.push(text.clone());
         }
+        self.sent += u64::from(text.starts_with("000#") || text.starts_with("605#"));
     }
 
     fn wake(&mut self, _: Mono, _: &mut Outbox) {}
@@ -185,6 +191,29 @@ fn restarted_node_is_started_again() {
     assert_eq!((run.outcome.events.restarts, run.outcome.events.changes), (1, 0));
     let after = run.kept.rows.iter().filter(|row| row.split(',').next().is_some_and(|time| time > "2500000")).count();
     assert!(after > 20, "rows continue: {after}");
+}
+
+/// The command that returns the node to its previous state is lost: once it is sent again, twice it is reported.
+#[test]
+fn lost_return_to_the_previous_state_is_noticed() {
+    let run = |lost: &[u64]| {
+        let devices = format!("clock = \"virtual\"\n{DPS}set = {{ \"0x1017\" = 100 }}\n");
+        let mut bus = Bench::from_toml(&devices, Path::new("")).expect("a bench").open().expect("a bus");
+        bus.attach(NmtRecorder::default());
+        let plan = FaultPlan { lose_sent: lost.iter().copied().collect(), ..FaultPlan::default() };
+        let (mut bus, mut kept) = (Faulty::new(bus, plan), Kept::default());
+        let outcome = log(&mut Master::new(&mut bus, Timing::default()), &self::plan(Mode::AsSent), &mut kept);
+        let remarks = outcome.expect("a recording").remarks;
+        let is_reported = remarks.iter().any(|remark| matches!(remark, Remark::StatesNotRestored(_)));
+        let recorder = bus.inner().stations::<NmtRecorder>().next().expect("attached");
+        (recorder.commands.clone(), recorder.places.clone(), is_reported)
+    };
+    let (commands, places, is_reported) = run(&[]);
+    assert_eq!((commands, is_reported), (["000#0105", "000#8005"].map(str::to_owned).to_vec(), false));
+    let (commands, _, is_reported) = run(&places[1..]);
+    assert_eq!((commands, is_reported), (["000#0105", "000#8005"].map(str::to_owned).to_vec(), false));
+    let (commands, _, is_reported) = run(&[places[1], places[1] + 1]);
+    assert_eq!((commands, is_reported), (["000#0105"].map(str::to_owned).to_vec(), true));
 }
 
 #[test]

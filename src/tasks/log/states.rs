@@ -6,6 +6,8 @@ use crate::canopen::nmt::{Life, NmtCommand, NmtState, booted};
 use crate::master::{Error, Happening, Master};
 use crate::node::Node;
 use crate::node::wait::{Policy, wait};
+use crate::tasks::Failure;
+use crate::tasks::nmt::NmtFailure;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -15,6 +17,9 @@ const MAX_HEARTBEAT_PERIOD: Duration = Duration::from_secs(2);
 
 /// The interval of checks whether the last commands were sent.
 const SEND_INTERVAL: Duration = Duration::from_millis(10);
+
+/// How long heartbeats are awaited that confirm the previous states.
+const CONFIRMATION_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// The nodes that were started, and their previous states.
 #[derive(Debug, Default)]
@@ -57,15 +62,21 @@ impl NmtStates {
         self.started.contains_key(&node)
     }
 
-    /// Restores the previous state of each node, if known.
-    pub(super) fn restore(&mut self, master: &mut Master<'_>) -> Result<(), Error> {
+    /// Restores the previous state of each node, if known. If the heartbeat then shows another state, the command is
+    /// sent once more.
+    ///
+    /// # Errors
+    /// Bus errors; a node that is still in another state.
+    pub(super) fn restore(&mut self, master: &mut Master<'_>) -> Result<(), Failure> {
         master.cancel();
-        for (&node, &before) in &self.started {
-            let command = match before {
-                Some(NmtState::PreOperational) => NmtCommand::EnterPreOperational,
-                Some(NmtState::Stopped) => NmtCommand::Stop,
-                _ => continue,
-            };
+        let command = |before: Option<NmtState>| match before {
+            Some(NmtState::PreOperational) => Some(NmtCommand::EnterPreOperational),
+            Some(NmtState::Stopped) => Some(NmtCommand::Stop),
+            _ => None,
+        };
+        let started = self.started.iter();
+        let mut open: BTreeMap<_, _> = started.filter_map(|(&node, &before)| Some((node, command(before)?))).collect();
+        for (&node, command) in &open {
             master.send(command.frame(Some(node)));
         }
         while master.is_sending() {
@@ -73,7 +84,31 @@ impl NmtStates {
             let until = master.now() + SEND_INTERVAL;
             wait(master, until, Policy::Observe, |_, _| ControlFlow::<()>::Continue(()))?;
         }
-        Ok(())
+        if open.is_empty() {
+            return Ok(());
+        }
+        let (mut asked_again, mut other_states) = (BTreeSet::new(), BTreeMap::new());
+        let until = master.now() + CONFIRMATION_TIMEOUT;
+        wait(master, until, Policy::Observe, |master, event| {
+            if let Happening::Frame(received) = event
+                && let Some((node, Life::State(state))) = Life::parse(&received.frame)
+                && let Some(&command) = open.get(&node)
+            {
+                if state == command.target() {
+                    open.remove(&node);
+                    other_states.remove(&node);
+                } else if asked_again.insert(node) {
+                    master.send(command.frame(Some(node)));
+                } else {
+                    other_states.insert(node, (state, command.target()));
+                }
+            }
+            if open.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        match other_states.pop_first() {
+            Some((node, (state, wanted))) => Err(Failure::at(node, NmtFailure::OtherState { state, wanted })),
+            None => Ok(()),
+        }
     }
 
     /// The started nodes that stay operational because their previous state is unknown.
