@@ -16,7 +16,7 @@
 /// }
 ///
 /// impl<B: Bus> Bus for Counting<B> {
-///     cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive
+///     cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live sends_remote_frames waits now mono listen receive
 ///         receive_buffer late_drops finish);
 ///
 ///     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
@@ -44,6 +44,11 @@ macro_rules! delegate_bus {
     ($this:ident, $inner:expr => is_live) => {
         fn is_live(&$this) -> bool {
             $inner.is_live()
+        }
+    };
+    ($this:ident, $inner:expr => sends_remote_frames) => {
+        fn sends_remote_frames(&$this) -> bool {
+            $inner.sends_remote_frames()
         }
     };
     ($this:ident, $inner:expr => waits) => {
@@ -154,6 +159,10 @@ mod tests {
         }
 
         fn is_live(&self) -> bool {
+            false
+        }
+
+        fn sends_remote_frames(&self) -> bool {
             false
         }
 

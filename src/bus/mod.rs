@@ -10,16 +10,23 @@ pub mod faults;
 pub mod file;
 pub mod interrupt;
 pub mod memory;
+mod own_clock;
 pub mod owner;
 mod pcapng;
 #[cfg(unix)]
 mod poll;
+mod port;
+pub mod remote;
 pub mod replay;
 #[cfg(test)]
 mod script;
-#[cfg(target_os = "linux")]
+pub mod server;
+mod slcan;
+#[cfg(all(target_os = "linux", not(without_socketcan)))]
 pub mod socketcan;
+mod socketcand;
 pub mod stdout;
+mod stream;
 pub mod time;
 pub mod trace;
 
@@ -48,6 +55,11 @@ pub trait Bus: BitRateControl {
     /// [`Bus::receive`].
     fn waits(&self) -> bool {
         !self.is_live()
+    }
+
+    /// Whether the transport carries remote frames (RTR).
+    fn sends_remote_frames(&self) -> bool {
+        true
     }
 
     /// The present moment on both time lines.
@@ -137,7 +149,7 @@ pub trait BitRateControl {
 }
 
 impl<B: Bus + ?Sized> Bus for Box<B> {
-    delegate_bus!(self, (**self) => name timestamps is_live waits now mono listen send receive receive_buffer
+    delegate_bus!(self, (**self) => name timestamps is_live sends_remote_frames waits now mono listen send receive receive_buffer
         late_drops finish);
 }
 
@@ -223,6 +235,8 @@ pub enum Fault {
     Transceiver,
     /// A transmission took too long.
     TransmitTimeout,
+    /// The adapter or server sent text that cannot be read. A frame may be lost.
+    Garbled,
     /// Another fault.
     Other,
 }
@@ -240,6 +254,7 @@ impl fmt::Display for Fault {
             Fault::ControllerOverflow => "controller buffer overflow",
             Fault::Transceiver => "transceiver fault",
             Fault::TransmitTimeout => "transmit time-out",
+            Fault::Garbled => "unreadable data from the adapter or server",
             Fault::Other => "bus error",
         })
     }
@@ -254,6 +269,8 @@ pub enum TimestampSource {
     Kernel,
     /// The clock of this program, when it read the frame.
     Program,
+    /// The socketcand server, converted to the host's time.
+    Server,
     /// The clock of the simulated bus.
     Simulated,
     /// The time stamp in the recording.
@@ -266,6 +283,7 @@ impl fmt::Display for TimestampSource {
             TimestampSource::Hardware => "hardware",
             TimestampSource::Kernel => "kernel",
             TimestampSource::Program => "program",
+            TimestampSource::Server => "server",
             TimestampSource::Simulated => "simulated",
             TimestampSource::Recorded => "recorded",
         })
@@ -303,6 +321,14 @@ pub enum BusError {
     /// The interface exists but is down.
     #[error("interface {0} is down")]
     Down(String),
+    /// The adapter or server cannot be used.
+    #[error("{name}: {why}")]
+    Unreachable {
+        /// The bus.
+        name: String,
+        /// The reason.
+        why: String,
+    },
     /// The interface is not a CAN interface.
     #[error("{0} is not a CAN interface")]
     NotCan(String),

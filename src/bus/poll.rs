@@ -17,10 +17,12 @@ pub(super) fn readable<const N: usize>(fds: [BorrowedFd<'_>; N], limit: Duration
     }
 }
 
-/// Polls any number of descriptors, with nanosecond resolution.
-#[cfg(target_os = "linux")]
-pub(super) fn any_readable(fds: &[BorrowedFd<'_>], limit: Duration) -> io::Result<Vec<bool>> {
-    let poll = |fd: &BorrowedFd<'_>| libc::pollfd { fd: fd.as_raw_fd(), events: libc::POLLIN, revents: 0 };
+/// Polls any number of descriptors. Those with `true` are also ready when they can be written.
+pub(super) fn ready(fds: &[(BorrowedFd<'_>, bool)], limit: Duration) -> io::Result<Vec<bool>> {
+    let poll = |(fd, writes): &(BorrowedFd<'_>, bool)| {
+        let events = if *writes { libc::POLLIN | libc::POLLOUT } else { libc::POLLIN };
+        libc::pollfd { fd: fd.as_raw_fd(), events, revents: 0 }
+    };
     let mut set: Vec<libc::pollfd> = fds.iter().map(poll).collect();
     if wait(&mut set, limit) >= 0 {
         return Ok(set.iter().map(|fd| fd.revents != 0).collect());

@@ -85,7 +85,7 @@ impl<B: Bus> BitRateControl for Traced<B> {
 }
 
 impl<B: Bus> Bus for Traced<B> {
-    delegate_bus!(self, self.bus => timestamps is_live waits now mono listen receive_buffer late_drops);
+    delegate_bus!(self, self.bus => timestamps is_live sends_remote_frames waits now mono listen receive_buffer late_drops);
 
     fn name(&self) -> &str {
         &self.name

@@ -1,6 +1,7 @@
 //! Types of arguments: nodes, signals, objects, durations. Arguments are checked here, before a bus is opened.
 
 use crate::bus::claim::Claim;
+use crate::bus::remote::{Remote, bit_rate};
 use crate::canopen::id::{CanId, NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
@@ -34,23 +35,11 @@ impl FromStr for Duration {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitRate(pub u32);
 
-/// The bit rates of classic CAN, in bit/s.
-const RATES: std::ops::RangeInclusive<u32> = 1_000..=1_000_000;
-
 impl FromStr for BitRate {
     type Err = String;
 
     fn from_str(text: &str) -> Result<BitRate, String> {
-        let (number, factor) = match text.strip_suffix(['k', 'K']) {
-            Some(number) => (number, 1_000),
-            None => text.strip_suffix('M').map_or((text, 1), |number| (number, 1_000_000)),
-        };
-        let digits = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-        let rate = number.parse::<u32>().ok().filter(|_| digits).and_then(|number| number.checked_mul(factor));
-        match rate.filter(|rate| RATES.contains(rate)) {
-            Some(rate) => Ok(BitRate(rate)),
-            None => Err(format!("\"{text}\" is not a CAN bit rate (250k, 1M, 125000)")),
-        }
+        bit_rate(text).map(BitRate)
     }
 }
 
@@ -187,12 +176,17 @@ pub enum BusSpec {
     Sim(Option<String>),
     /// A recording: `FILE`, `FILE:CHANNEL`, or `-`.
     Replay(String),
+    /// An adapter or a server.
+    Remote(Remote),
 }
 
 impl FromStr for BusSpec {
     type Err = String;
 
     fn from_str(text: &str) -> Result<BusSpec, String> {
+        if let Some(remote) = Remote::parse(text) {
+            return remote.map(BusSpec::Remote);
+        }
         match text.split_once(':') {
             None if text == "sim" => Ok(BusSpec::Sim(None)),
             Some(("sim", rest)) => Ok(BusSpec::Sim(Some(rest.to_owned()))),
@@ -200,7 +194,8 @@ impl FromStr for BusSpec {
             Some(("replay", file)) if !file.is_empty() => Ok(BusSpec::Replay(file.to_owned())),
             None => interface(text),
             Some(_) => Err(format!(
-                "\"{text}\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE)"
+                "\"{text}\" is not a bus (can0, socketcan:can0, socketcand://HOST/can0, slcan:/dev/ttyACM0@250k, sim, \
+                 sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE)"
             )),
         }
     }
@@ -226,7 +221,7 @@ impl FromStr for InterfaceName {
     fn from_str(text: &str) -> Result<InterfaceName, String> {
         match text.parse()? {
             BusSpec::SocketCan(name) => Ok(InterfaceName(name)),
-            BusSpec::Sim(_) | BusSpec::Replay(_) => {
+            BusSpec::Sim(_) | BusSpec::Replay(_) | BusSpec::Remote(_) => {
                 Err(format!("\"{text}\" is not a CAN interface of this computer (can0)"))
             }
         }

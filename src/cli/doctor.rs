@@ -27,7 +27,7 @@ pub(crate) struct Doctor {
     node: Option<Nodes>,
     /// Send nothing
     #[arg(long)]
-    passive: bool,
+    pub(super) passive: bool,
 }
 
 impl Doctor {

@@ -29,6 +29,7 @@ impl FileJournal {
     pub(super) fn of(bus: &BusSpec) -> FileJournal {
         match bus {
             BusSpec::SocketCan(name) => FileJournal::in_folder(folder(), name),
+            BusSpec::Remote(remote) => FileJournal::in_folder(folder(), &remote.to_string()),
             BusSpec::Sim(_) | BusSpec::Replay(_) => FileJournal::in_folder(None, ""),
         }
     }

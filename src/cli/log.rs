@@ -71,7 +71,7 @@ pub(crate) struct Log {
     request: Option<Duration>,
     /// Send nothing at all
     #[arg(long)]
-    passive: bool,
+    pub(super) passive: bool,
     /// Do not change the NMT state of the nodes
     #[arg(long)]
     no_nmt: bool,

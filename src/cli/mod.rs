@@ -95,7 +95,8 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump,
+    /// Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k
+    /// (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump,
     /// Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that
     /// is up]
     #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
@@ -170,6 +171,10 @@ pub struct Global {
     /// Whether the command only reads: a description of another device is then a warning.
     #[arg(skip)]
     pub(crate) only_reads: bool,
+
+    /// Whether the command only listens.
+    #[arg(skip)]
+    pub(crate) listens_only: bool,
 
     /// The reaction of the command if two devices have one node-ID.
     #[arg(skip)]
@@ -265,6 +270,16 @@ impl Command {
             Command::Objects(_) | Command::Devices(_) | Command::Export(_) => true,
             Command::Sdo(sdo) => sdo.only_reads(),
             Command::Config(config) => config.only_reads(),
+            _ => false,
+        }
+    }
+
+    /// Whether the command only listens: an adapter then sends no acknowledge either.
+    fn listens_only(&self) -> bool {
+        match self {
+            Command::Scan(scan) => scan.passive,
+            Command::Log(log) => log.passive,
+            Command::Doctor(doctor) => doctor.passive,
             _ => false,
         }
     }
@@ -451,6 +466,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
     let global = Global {
         claim: cli.command.claim(),
         only_reads: cli.command.only_reads(),
+        listens_only: cli.command.listens_only(),
         on_two_devices: cli.command.on_two_devices(),
         shows_states: matches!(cli.command, Command::Scan(_) | Command::Nmt(_)),
         ..cli.global.clone()

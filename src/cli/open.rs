@@ -8,6 +8,7 @@ use crate::bus::channels::{SdoChannel, SdoChannels};
 use crate::bus::claim::{Claim, ClaimError, Claims, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
+use crate::bus::remote::Use;
 use crate::bus::replay::{Replay, ReplayNote};
 use crate::bus::time::format_duration;
 use crate::bus::trace::Traced;
@@ -45,16 +46,20 @@ pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
     open_as(global, &spec(global)?, false)
 }
 
-/// Claims the nodes that the command uses. Only a CAN interface is shared with other processes.
+/// Claims the nodes that the command uses. A simulated bus and a recording are not shared with other processes.
 pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> {
-    let BusSpec::SocketCan(bus) = spec else { return Ok(Claims::default()) };
+    let bus = match spec {
+        BusSpec::SocketCan(name) => name.clone(),
+        BusSpec::Remote(remote) => remote.to_string(),
+        BusSpec::Sim(_) | BusSpec::Replay(_) => return Ok(Claims::default()),
+    };
     let (if_held, consequence) = if global.ignore_lock {
         (IfHeld::Continue, "continuing (--ignore-lock)")
     } else {
         (IfHeld::Wait(CLAIM_TIMEOUT), "waiting for it to end")
     };
     let mut report = |error: &ClaimError| global.console().note(&format!("{error}; {consequence}"));
-    Claims::take(bus, &global.claim, if_held, &mut report).map_err(|error| match error {
+    Claims::take(&bus, &global.claim, if_held, &mut report).map_err(|error| match error {
         ClaimError::InUse(part, _) => {
             let node = if let Part::Node(node) = part { Some(node) } else { None };
             Failure { node, ..BusError::InUse(error.to_string()).into() }
@@ -74,16 +79,25 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
         BusSpec::Replay(spec) => Box::new(recording(global, spec)?),
         BusSpec::SocketCan(name) => within(global, || socketcan(name, even_down), is_missing)?.or_fail()?,
-    };
-    // After the bus: without one, an existing trace keeps its content. Nothing was sent yet.
-    let bus: Box<dyn Bus> = match &global.trace {
-        Some(path) => {
-            let (out, name) = trace_output(path)?;
-            Box::new(Traced::new(bus, out, &name))
+        BusSpec::Remote(remote) => {
+            let purpose = match (even_down, global.listens_only) {
+                (true, _) => Use::Configure,
+                (false, true) => Use::Listen,
+                (false, false) => Use::Normal,
+            };
+            within(global, || remote.open(purpose), is_missing)?.map_err(interrupted)?
         }
-        None => bus,
     };
+    let bus = traced(global, bus)?;
     Ok(if channels.is_empty() { bus } else { Box::new(SdoChannels::new(bus, &channels)) })
+}
+
+/// The bus with a trace, if one is asked for. The trace is opened after the bus: without a bus, an existing one keeps its
+/// content. Nothing was sent yet.
+pub(super) fn traced(global: &Global, bus: Box<dyn Bus>) -> anyhow::Result<Box<dyn Bus>> {
+    let Some(path) = &global.trace else { return Ok(bus) };
+    let (out, name) = trace_output(path)?;
+    Ok(Box::new(Traced::new(bus, out, &name)))
 }
 
 /// The SDO channels that the user named.
@@ -141,9 +155,17 @@ fn recording(global: &Global, spec: &str) -> anyhow::Result<Replay> {
     Ok(if global.pace { bus.in_real_time(Box::new(interrupts()?)) } else { bus })
 }
 
+/// Ctrl-C ends the opening of a bus that waits for its other side.
+fn interrupted(error: BusError) -> Failure {
+    match error {
+        BusError::Io { source, .. } if source.kind() == io::ErrorKind::Interrupted => Error::Interrupted.into(),
+        error => error.into(),
+    }
+}
+
 /// Why an interface cannot be opened yet.
 fn is_missing(error: &BusError) -> Option<String> {
-    matches!(error, BusError::NoInterface(_) | BusError::Down(_)).then(|| error.to_string())
+    matches!(error, BusError::NoInterface(_) | BusError::Down(_) | BusError::Unreachable { .. }).then(|| error.to_string())
 }
 
 /// Tries again, as long as `--wait` allows, while `obstacle` names something that may change.
@@ -187,24 +209,24 @@ pub(super) fn bench_error(error: BenchError) -> anyhow::Error {
     }
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", not(without_socketcan)))]
 fn socketcan(name: &str, even_down: bool) -> Result<Box<dyn Bus>, BusError> {
     use crate::bus::socketcan::SocketCan;
     let open = if even_down { SocketCan::open_even_down } else { SocketCan::open };
     Ok(Box::new(open(name)?))
 }
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(all(target_os = "linux", not(without_socketcan))))]
 fn socketcan(name: &str, _: bool) -> Result<Box<dyn Bus>, BusError> {
     Err(BusError::Unsupported(format!("{name}: this system has no SocketCAN")))
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", not(without_socketcan)))]
 fn interfaces() -> Vec<(String, bool)> {
     crate::bus::socketcan::interfaces().into_iter().map(|interface| (interface.name, interface.up)).collect()
 }
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(all(target_os = "linux", not(without_socketcan))))]
 fn interfaces() -> Vec<(String, bool)> {
     Vec::new()
 }

@@ -28,7 +28,7 @@ pub(crate) struct Scan {
     nodes: Nodes,
     /// Send nothing: list the nodes that send something within 3 s (or --timeout)
     #[arg(long)]
-    passive: bool,
+    pub(super) passive: bool,
 }
 
 impl Scan {

@@ -240,7 +240,7 @@ fn guard(
     let may_guard = |node: &NodeId| sources[node].may_guard && sources[node].heartbeat.is_none();
     let asked: Vec<NodeId> = nodes.iter().copied().filter(may_guard).collect();
     let mut states = BTreeMap::new();
-    if asked.is_empty() {
+    if asked.is_empty() || !master.bus().sends_remote_frames() {
         return Ok(states);
     }
     // With two masters, each would get an answer with the toggle bit that the other one expects.

@@ -97,9 +97,10 @@ impl Drop for Claims {
 /// Empties the queues of the sockets until `stopped` is closed. Each process that asks for the holder of a name
 /// connects. Without this thread, the connection would stay in the queue until the holder ends.
 fn drain(listeners: &[UnixListener], stopped: &UnixStream) {
-    let fds: Vec<_> = listeners.iter().map(AsFd::as_fd).chain([stopped.as_fd()]).collect();
+    let sources = listeners.iter().map(AsFd::as_fd).chain([stopped.as_fd()]);
+    let fds: Vec<_> = sources.map(|fd| (fd, false)).collect();
     loop {
-        match poll::any_readable(&fds, Duration::MAX) {
+        match poll::ready(&fds, Duration::MAX) {
             Ok(ready) if ready.last() == Some(&true) => return,
             Ok(_) => {}
             Err(_) => return,

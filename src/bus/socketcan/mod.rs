@@ -8,12 +8,12 @@ mod clocks;
 mod faults;
 mod interfaces;
 mod netlink;
-mod own_clock;
 mod receive;
 mod setup;
 mod socket;
 
 use super::interrupt::Interrupts;
+use super::own_clock::OwnClock;
 use super::{
     BitRateControl, Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource, Wall,
     poll,
@@ -23,7 +23,6 @@ use crate::canopen::id::CanId;
 use clocks::Clocks;
 pub use interfaces::{Interface, interfaces};
 pub use netlink::{BitTiming, Link, State};
-use own_clock::OwnClock;
 use receive::{Batch, Message};
 pub use setup::{Change, bring_down, bring_up, link};
 use socket::Bound;

@@ -9,7 +9,7 @@ pub(super) struct Changed {
     pub(super) after: Interface,
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", not(without_socketcan)))]
 mod linux {
     use super::{Changed, Failure, Interface};
     use crate::bus::Mode;
@@ -72,25 +72,25 @@ mod linux {
     }
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", not(without_socketcan)))]
 pub(super) use linux::{down, list, up};
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(all(target_os = "linux", not(without_socketcan))))]
 pub(super) fn list() -> Vec<Interface> {
     Vec::new()
 }
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(all(target_os = "linux", not(without_socketcan))))]
 pub(super) fn up(name: &str, _: Option<u32>, _: bool) -> Result<Changed, Failure> {
     Err(unsupported(name))
 }
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(all(target_os = "linux", not(without_socketcan))))]
 pub(super) fn down(name: &str) -> Result<Changed, Failure> {
     Err(unsupported(name))
 }
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(all(target_os = "linux", not(without_socketcan))))]
 fn unsupported(name: &str) -> Failure {
     use crate::tasks::host::{HostAction, not_set};
     let error = crate::bus::BusError::Unsupported(format!("{name}: this system has no SocketCAN"));

@@ -25,9 +25,15 @@ pub(super) fn bus(error: &BusError) -> Words {
         BusError::Down(name) if name.starts_with("vcan") || name.starts_with("vxcan") => {
             words.hint(format!("bring it up: sudo cangauge bus up {name}"))
         }
+        BusError::Down(name) if name.contains(':') => words.hint("check the cable, the adapter or the server"),
         BusError::Down(name) => {
             words.hint(format!("bring it up: sudo cangauge bus up {name} 250k (use the sensors' bit rate)"))
         }
+        BusError::Unreachable { name, .. } => words.hint(if name.starts_with("socketcand") {
+            "check the address, the name of the bus and that socketcand runs there; to wait for it, add --wait 1m"
+        } else {
+            "list the serial adapters: cangauge bus list; to wait for one, add --wait 1m"
+        }),
         BusError::NoInterface(_) | BusError::NotCan(_) => {
             words.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
         }

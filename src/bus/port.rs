@@ -1,0 +1,165 @@
+//! A byte stream to an adapter or a server: a serial port or a TCP connection. Reads and writes never wait.
+
+use super::interrupt::Interrupts;
+use serial2::SerialPort;
+use socket2::{Domain, Protocol, SockAddr, Socket, TcpKeepalive, Type};
+use std::fmt;
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Where a byte stream is opened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// A serial port and its speed in bit/s.
+    Serial(PathBuf, u32),
+    /// A host and a TCP port.
+    Tcp(String, u16),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Serial(path, _) => path.display().fmt(f),
+            Place::Tcp(host, port) if host.contains(':') => write!(f, "[{host}]:{port}"),
+            Place::Tcp(host, port) => write!(f, "{host}:{port}"),
+        }
+    }
+}
+
+/// An open byte stream.
+#[derive(Debug)]
+pub(super) enum Port {
+    Serial(SerialPort),
+    Tcp(Socket),
+}
+
+impl Port {
+    /// Opens a serial port, and locks it: two programs at one adapter would disturb each other.
+    pub(super) fn serial(path: &PathBuf, speed: u32) -> io::Result<Port> {
+        let mut port = SerialPort::open(path, speed)?;
+        port.set_read_timeout(Duration::ZERO)?;
+        port.set_write_timeout(Duration::ZERO)?;
+        #[cfg(unix)]
+        {
+            let file = std::fs::File::from(std::os::fd::AsFd::as_fd(&port).try_clone_to_owned()?);
+            if let Err(std::fs::TryLockError::WouldBlock) = file.try_lock() {
+                return Err(io::Error::new(io::ErrorKind::ResourceBusy, "another program uses it"));
+            }
+        }
+        Ok(Port::Serial(port))
+    }
+
+    /// Begins a TCP connection. It is complete when the port can be written, see [`Port::connected`].
+    pub(super) fn tcp(address: SocketAddr) -> io::Result<Port> {
+        let socket = Socket::new(Domain::for_address(address), Type::STREAM, Some(Protocol::TCP))?;
+        socket.set_nonblocking(true)?;
+        socket.set_tcp_nodelay(true)?;
+        // A host without power or network is noticed within half a minute.
+        let keepalive = TcpKeepalive::new().with_time(Duration::from_secs(10)).with_interval(Duration::from_secs(5));
+        socket.set_tcp_keepalive(&keepalive)?;
+        match socket.connect(&SockAddr::from(address)) {
+            Err(error) if !is_pending(&error) => Err(error),
+            _ => Ok(Port::Tcp(socket)),
+        }
+    }
+
+    /// Whether the port is connected.
+    pub(super) fn connected(&self) -> io::Result<bool> {
+        let Port::Tcp(socket) = self else { return Ok(true) };
+        match socket.take_error()? {
+            Some(error) => Err(error),
+            None => Ok(socket.peer_addr().is_ok()),
+        }
+    }
+
+    /// Reads available bytes; 0: there are none yet.
+    ///
+    /// # Errors
+    /// The connection ended.
+    pub(super) fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = match self {
+            Port::Serial(port) => port.read(buffer),
+            Port::Tcp(socket) => socket.read(buffer),
+        };
+        match read {
+            Ok(0) => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the connection was closed")),
+            Err(error) if is_pending(&error) => Ok(0),
+            result => result,
+        }
+    }
+
+    /// Writes as many bytes as fit.
+    pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = match self {
+            Port::Serial(port) => port.write(bytes),
+            Port::Tcp(socket) => socket.write(bytes),
+        };
+        written.or_else(|error| if is_pending(&error) { Ok(0) } else { Err(error) })
+    }
+}
+
+fn is_pending(error: &io::Error) -> bool {
+    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+    // A connection that has begun.
+    #[cfg(unix)]
+    if error.raw_os_error() == Some(libc::EINPROGRESS) {
+        return true;
+    }
+    // A TCP connection ends with TimedOut as well, but then with a code of the system.
+    match error.kind() {
+        WouldBlock | Interrupted => true,
+        TimedOut => error.raw_os_error().is_none(),
+        _ => false,
+    }
+}
+
+/// The addresses of a host.
+pub(super) fn resolve(host: &str, port: u16) -> io::Result<Vec<SocketAddr>> {
+    Ok((host, port).to_socket_addrs()?.collect())
+}
+
+#[cfg(unix)]
+impl std::os::fd::AsFd for Port {
+    fn as_fd(&self) -> std::os::fd::BorrowedFd<'_> {
+        match self {
+            Port::Serial(port) => port.as_fd(),
+            Port::Tcp(socket) => socket.as_fd(),
+        }
+    }
+}
+
+#[cfg(unix)]
+pub(super) use std::os::fd::AsFd as Waitable;
+
+/// Anything: other systems do not wait for a descriptor.
+#[cfg(not(unix))]
+pub(super) trait Waitable {}
+#[cfg(not(unix))]
+impl<T> Waitable for T {}
+
+/// Waits until one of the sources can be read, or written if its flag is set, until a signal arrives, or until `limit`
+/// has passed. Returns which sources are ready.
+#[cfg(unix)]
+pub(super) fn wait(
+    sources: &[(&dyn Waitable, bool)],
+    interrupts: &mut Interrupts,
+    limit: Duration,
+) -> io::Result<Vec<bool>> {
+    let signals = interrupts.fd();
+    let mut fds: Vec<_> = sources.iter().map(|(source, writes)| (source.as_fd(), *writes)).collect();
+    fds.push((signals, false));
+    let mut ready = super::poll::ready(&fds, limit)?;
+    if ready.pop() == Some(true) {
+        interrupts.collect();
+    }
+    Ok(ready)
+}
+
+/// The same where the system cannot wait for both: in short steps.
+#[cfg(not(unix))]
+pub(super) fn wait(sources: &[(&dyn Waitable, bool)], _: &mut Interrupts, limit: Duration) -> io::Result<Vec<bool>> {
+    std::thread::sleep(limit.min(Duration::from_millis(1)));
+    Ok(vec![true; sources.len()])
+}

@@ -1,0 +1,201 @@
+//! The names of buses behind a byte stream, and which transport serves each of them.
+
+use super::port::Place;
+use super::slcan::Slcan;
+use super::socketcand::Client;
+use super::stream::StreamBus;
+use super::{Bus, BusError, Mode};
+use std::fmt;
+
+/// The TCP port of socketcand.
+pub const SOCKETCAND_PORT: u16 = 29536;
+/// The speed of a serial port, in bit/s. Adapters with USB ignore it.
+const SERIAL_SPEED: u32 = 115_200;
+
+/// A bus behind a byte stream: `socketcand://HOST[:PORT]/BUS`, `slcan:DEVICE@RATE`, `slcan:tcp://HOST:PORT@RATE`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Remote {
+    name: String,
+    place: Place,
+    transport: Transport,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Transport {
+    /// The name of the bus at the server.
+    Socketcand(String),
+    /// The bit rate in bit/s.
+    Slcan(u32),
+}
+
+/// How a bus is opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// To send and to receive.
+    Normal,
+    /// To receive only: the adapter also sends no acknowledge.
+    Listen,
+    /// To set the bit rate first: the channel stays closed.
+    Configure,
+}
+
+impl Remote {
+    /// The bus that `text` names; `None` if it is of another kind.
+    ///
+    /// # Errors
+    /// A mistake in the name.
+    pub fn parse(text: &str) -> Option<Result<Remote, String>> {
+        if let Some(rest) = text.strip_prefix("socketcand://") {
+            let parsed = socketcand(rest).ok_or_else(|| format!("\"{text}\" is not socketcand://HOST[:PORT]/BUS"));
+            return Some(parsed.map(|(place, bus)| Remote {
+                name: text.to_owned(),
+                place,
+                transport: Transport::Socketcand(bus),
+            }));
+        }
+        let rest = text.strip_prefix("slcan:")?;
+        Some(slcan(rest).map(|(place, bit_rate)| Remote {
+            name: text.to_owned(),
+            place,
+            transport: Transport::Slcan(bit_rate),
+        }))
+    }
+
+    /// Opens the bus.
+    ///
+    /// # Errors
+    /// The adapter or server cannot be reached, or refuses.
+    pub fn open(&self, purpose: Use) -> Result<Box<dyn Bus>, BusError> {
+        Ok(match &self.transport {
+            Transport::Socketcand(bus) => Box::new(StreamBus::open(&self.name, &self.place, Client::new(bus))?),
+            Transport::Slcan(bit_rate) => {
+                let mode = match purpose {
+                    Use::Normal => Some(Mode::Normal),
+                    Use::Listen => Some(Mode::ListenOnly),
+                    Use::Configure => None,
+                };
+                Box::new(StreamBus::open(&self.name, &self.place, Slcan::new(*bit_rate, mode))?)
+            }
+        })
+    }
+}
+
+impl fmt::Display for Remote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+/// `HOST[:PORT]/BUS`.
+fn socketcand(text: &str) -> Option<(Place, String)> {
+    let (host, bus) = text.split_once('/')?;
+    let is_word = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic() && !b"<>/".contains(&byte));
+    let place = tcp(host, Some(SOCKETCAND_PORT))?;
+    is_word(bus).then(|| (place, bus.to_owned()))
+}
+
+/// `HOST:PORT`, `[::1]:PORT`.
+fn tcp(text: &str, default_port: Option<u16>) -> Option<Place> {
+    let (host, port) = match text.strip_prefix('[') {
+        Some(rest) => {
+            let (host, port) = rest.split_once(']')?;
+            (host, if port.is_empty() { None } else { Some(port.strip_prefix(':')?) })
+        }
+        None => text.split_once(':').map_or((text, None), |(host, port)| (host, Some(port))),
+    };
+    let port = match port {
+        Some(port) => port.parse().ok().filter(|port| *port > 0),
+        None => default_port,
+    };
+    (!host.is_empty()).then_some(())?;
+    Some(Place::Tcp(host.to_owned(), port?))
+}
+
+/// `DEVICE@RATE[,serial=SPEED]`, `tcp://HOST:PORT@RATE`.
+fn slcan(text: &str) -> Result<(Place, u32), String> {
+    let (text, speed) = match text.rsplit_once(",serial=") {
+        Some((text, speed)) => (text, Some(speed)),
+        None => (text, None),
+    };
+    let Some((device, rate)) = text.rsplit_once('@').filter(|(device, rate)| !device.is_empty() && !rate.is_empty())
+    else {
+        return Err(format!("slcan:{text} needs the bit rate of the bus, for example slcan:{}@250k", text.trim_end_matches('@')));
+    };
+    let rate = bit_rate(rate)?;
+    let place = match device.strip_prefix("tcp://") {
+        Some(host) if speed.is_none() => {
+            tcp(host, None).ok_or_else(|| format!("\"slcan:{text}\" is not slcan:tcp://HOST:PORT@RATE"))?
+        }
+        Some(_) => return Err("serial= is for a serial port, not for TCP".to_owned()),
+        None => {
+            let speed = match speed {
+                Some(speed) => speed.parse().ok().filter(|speed| *speed > 0),
+                None => Some(SERIAL_SPEED),
+            };
+            Place::Serial(device.into(), speed.ok_or("serial= needs a speed in bit/s, for example serial=115200")?)
+        }
+    };
+    Ok((place, rate))
+}
+
+/// The bit rates of classic CAN, in bit/s.
+const RATES: std::ops::RangeInclusive<u32> = 1_000..=1_000_000;
+
+/// A bit rate of CAN in bit/s: `250k`, `1M`, `125000`.
+///
+/// # Errors
+/// It is none.
+pub fn bit_rate(text: &str) -> Result<u32, String> {
+    let (number, factor) = match text.strip_suffix(['k', 'K']) {
+        Some(number) => (number, 1_000),
+        None => text.strip_suffix('M').map_or((text, 1), |number| (number, 1_000_000)),
+    };
+    let digits = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    let rate = number.parse::<u32>().ok().filter(|_| digits).and_then(|number| number.checked_mul(factor));
+    rate.filter(|rate| RATES.contains(rate))
+        .ok_or_else(|| format!("\"{text}\" is not a CAN bit rate (250k, 1M, 125000)"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn place(text: &str) -> Option<(Place, Transport)> {
+        let remote = Remote::parse(text).expect("a remote bus").ok()?;
+        assert_eq!(remote.to_string(), text);
+        Some((remote.place, remote.transport))
+    }
+
+    #[test]
+    fn names_of_remote_buses() {
+        let tcp = |host: &str, port| Place::Tcp(host.to_owned(), port);
+        let server = |host, port, bus: &str| Some((tcp(host, port), Transport::Socketcand(bus.to_owned())));
+        assert_eq!(place("socketcand://pi/can0"), server("pi", 29536, "can0"));
+        assert_eq!(place("socketcand://10.0.0.7:4000/vcan1"), server("10.0.0.7", 4000, "vcan1"));
+        assert_eq!(place("socketcand://[::1]:4000/can0"), server("::1", 4000, "can0"));
+        let adapter = |path: &str, speed, rate| Some((Place::Serial(path.into(), speed), Transport::Slcan(rate)));
+        assert_eq!(place("slcan:/dev/ttyACM0@250k"), adapter("/dev/ttyACM0", 115_200, 250_000));
+        assert_eq!(place("slcan:COM3@1M,serial=3000000"), adapter("COM3", 3_000_000, 1_000_000));
+        assert_eq!(place("slcan:tcp://wifi:35000@125k"), Some((tcp("wifi", 35000), Transport::Slcan(125_000))));
+        for wrong in [
+            "socketcand://",
+            "socketcand://pi",
+            "socketcand://pi/",
+            "socketcand:///can0",
+            "socketcand://pi:0/can0",
+            "socketcand://pi:70000/can0",
+            "socketcand://pi/a b",
+            "socketcand://pi/> <",
+            "slcan:/dev/ttyACM0",
+            "slcan:/dev/ttyACM0@",
+            "slcan:@250k",
+            "slcan:/dev/ttyACM0@250",
+            "slcan:/dev/ttyACM0@250k,serial=fast",
+            "slcan:tcp://wifi@250k",
+            "slcan:tcp://wifi:1@250k,serial=115200",
+        ] {
+            assert_eq!(place(wrong), None, "{wrong}");
+        }
+        assert_eq!(Remote::parse("can0"), None);
+    }
+}

@@ -1,0 +1,229 @@
+//! A bus whose other participants are the clients of a socketcand server: each receives the frames of this program and
+//! of the other clients.
+
+use super::interrupt::Interrupts;
+use super::port::{Waitable, wait};
+use super::socketcand::{Messages, frame_message, sent_frame};
+use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
+use crate::canopen::frame::Frame;
+use std::collections::VecDeque;
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::time::{Duration, Instant};
+
+/// A client that leaves more bytes than this unread is disconnected.
+const MAX_WAITING: usize = 256 * 1024;
+/// More clients than this are not accepted.
+const MAX_CLIENTS: usize = 64;
+
+/// A socketcand server. Each name of a bus that a client opens is this bus.
+pub struct Server {
+    name: String,
+    listener: TcpListener,
+    clients: Vec<Client>,
+    interrupts: Interrupts,
+    opened: Instant,
+    ready: VecDeque<Event>,
+    filters: Filters,
+}
+
+struct Client {
+    stream: TcpStream,
+    messages: Messages,
+    has_opened: bool,
+    is_raw: bool,
+    waiting: Vec<u8>,
+    is_gone: bool,
+}
+
+impl Client {
+    fn say(&mut self, message: &str) {
+        self.waiting.extend(message.bytes());
+        self.flush();
+    }
+
+    fn flush(&mut self) {
+        while !self.waiting.is_empty() && !self.is_gone {
+            match self.stream.write(&self.waiting) {
+                Ok(count @ 1..) => drop(self.waiting.drain(..count)),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Ok(_) | Err(_) => self.is_gone = true,
+            }
+        }
+        self.is_gone |= self.waiting.len() > MAX_WAITING;
+    }
+
+    /// Reads what the client sent. Returns its frames.
+    fn read(&mut self) -> Vec<Frame> {
+        let mut buffer = [0; 4096];
+        let count = match self.stream.read(&mut buffer) {
+            Ok(0) => {
+                self.is_gone = true;
+                0
+            }
+            Ok(count) => count,
+            Err(error) => {
+                self.is_gone |= !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted);
+                0
+            }
+        };
+        let (mut frames, mut found) = (Vec::new(), Vec::new());
+        self.messages.feed(&buffer[..count], |message| found.extend(message.map(str::to_owned)));
+        for message in found {
+            frames.extend(self.process(&message));
+        }
+        frames
+    }
+
+    fn process(&mut self, message: &str) -> Option<Frame> {
+        let mut words = message.split_ascii_whitespace();
+        match words.next().unwrap_or_default() {
+            "open" if words.next().is_some() => {
+                self.has_opened = true;
+                self.say("< ok >");
+            }
+            "rawmode" if self.has_opened => {
+                self.is_raw = true;
+                self.say("< ok >");
+            }
+            "send" if self.is_raw => match sent_frame(words) {
+                Some(frame) => return Some(frame),
+                None => self.say("< error invalid frame >"),
+            },
+            "echo" => self.say("< echo >"),
+            _ => self.say("< error unknown command >"),
+        }
+        None
+    }
+}
+
+impl Server {
+    /// Listens at an address.
+    ///
+    /// # Errors
+    /// The address is in use, or not one of this host.
+    pub fn listen(address: SocketAddr) -> Result<Server, BusError> {
+        let failed = |source| BusError::Io { what: format!("listen at {address}"), source };
+        let listener = TcpListener::bind(address).map_err(failed)?;
+        listener.set_nonblocking(true).map_err(failed)?;
+        Ok(Server {
+            name: format!("socketcand {}", listener.local_addr().map_err(failed)?),
+            listener,
+            clients: Vec::new(),
+            interrupts: Interrupts::new().map_err(failed)?,
+            opened: Instant::now(),
+            ready: VecDeque::new(),
+            filters: Filters::All,
+        })
+    }
+
+    /// The address, with the port that the system has chosen.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub fn address(&self) -> io::Result<SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    fn accept(&mut self) {
+        while let Ok((stream, _)) = self.listener.accept() {
+            if self.clients.len() >= MAX_CLIENTS || stream.set_nonblocking(true).is_err() {
+                continue;
+            }
+            // Only a matter of speed.
+            let _ = stream.set_nodelay(true);
+            let mut client = Client {
+                stream,
+                messages: Messages::default(),
+                has_opened: false,
+                is_raw: false,
+                waiting: Vec::new(),
+                is_gone: false,
+            };
+            client.say("< hi >");
+            self.clients.push(client);
+        }
+    }
+
+    /// Passes a frame to all clients except its sender.
+    fn pass(&mut self, frame: &Frame, sender: Option<usize>) {
+        // The protocol has no remote frames.
+        if frame.is_remote() {
+            return;
+        }
+        let message = frame_message(frame, self.now());
+        for (index, client) in self.clients.iter_mut().enumerate() {
+            if client.is_raw && sender != Some(index) {
+                client.say(&message);
+            }
+        }
+    }
+
+    fn work(&mut self, limit: Duration) -> Result<(), BusError> {
+        let listener: (&dyn Waitable, bool) = (&self.listener, false);
+        let clients = self.clients.iter().map(|it| (&it.stream as &dyn Waitable, !it.waiting.is_empty()));
+        let sources: Vec<_> = [listener].into_iter().chain(clients).collect();
+        let ready = wait(&sources, &mut self.interrupts, limit)
+            .map_err(|source| BusError::Io { what: format!("wait for {}", self.name), source })?;
+        for (index, _) in ready.iter().skip(1).enumerate().filter(|(_, ready)| **ready) {
+            self.clients[index].flush();
+            for frame in self.clients[index].read() {
+                self.pass(&frame, Some(index));
+                if self.filters.wants(&frame) {
+                    let received = Received { frame, at: self.now() };
+                    self.ready.push_back(Event::Frame(received));
+                }
+            }
+        }
+        self.clients.retain(|client| !client.is_gone);
+        self.accept();
+        Ok(())
+    }
+}
+
+impl BitRateControl for Server {}
+
+impl Bus for Server {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        TimestampSource::Program
+    }
+
+    fn sends_remote_frames(&self) -> bool {
+        false
+    }
+
+    fn now(&self) -> Stamp {
+        Stamp { mono: Mono::at(self.opened.elapsed()), wall: Wall::now() }
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        self.filters = filters.clone();
+        Ok(())
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.pass(frame, None);
+        Ok(())
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        loop {
+            if self.interrupts.take() {
+                return Ok(Event::Interrupted);
+            }
+            if let Some(event) = self.ready.pop_front() {
+                return Ok(event);
+            }
+            let left = deadline.since(self.mono());
+            self.work(left)?;
+            if left.is_zero() && self.ready.is_empty() {
+                return Ok(Event::Timeout);
+            }
+        }
+    }
+}

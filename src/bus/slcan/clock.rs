@@ -1,0 +1,67 @@
+//! The clock of an adapter: milliseconds that start again each minute.
+
+use crate::bus::Mono;
+use std::time::Duration;
+
+/// Continues the milliseconds of an adapter beyond their end.
+#[derive(Debug)]
+pub(super) struct MinuteClock {
+    /// The number of milliseconds after which the adapter starts again.
+    period: u32,
+    /// The last reading, when it came, and the time since the first one.
+    last: Option<(u32, Mono, Duration)>,
+}
+
+impl Default for MinuteClock {
+    fn default() -> MinuteClock {
+        MinuteClock { period: 60_000, last: None }
+    }
+}
+
+impl MinuteClock {
+    /// The time since the first reading.
+    pub(super) fn continued(&mut self, reading: u16, now: Mono) -> Duration {
+        let reading = u32::from(reading);
+        if reading >= self.period {
+            // Some firmware uses all 16 bits.
+            *self = MinuteClock { period: 0x1_0000, last: None };
+        }
+        let time = match self.last {
+            None => Duration::ZERO,
+            Some((before, at, time)) => {
+                let period = Duration::from_millis(u64::from(self.period));
+                let step = Duration::from_millis(u64::from((reading + self.period - before) % self.period));
+                // A frame may wait for half a minute before it arrives, so the whole minutes are rounded.
+                let minutes = (now.since(at) + period / 2).saturating_sub(step).as_nanos() / period.as_nanos();
+                time + step + period * u32::try_from(minutes).unwrap_or(u32::MAX)
+            }
+        };
+        self.last = Some((reading, now, time));
+        time
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(readings: &[(u64, u16)]) -> Vec<u128> {
+        let mut clock = MinuteClock::default();
+        readings
+            .iter()
+            .map(|&(now, reading)| clock.continued(reading, Mono::at(Duration::from_millis(now))).as_millis())
+            .collect()
+    }
+
+    #[test]
+    fn minutes_are_continued() {
+        assert_eq!(times(&[(0, 59_990), (25, 5), (60_030, 15), (250_000, 10_000)]), [0, 15, 60_025, 250_010]);
+        // A frame that arrived late, and one that arrived early after it.
+        assert_eq!(times(&[(0, 100), (900, 200), (900, 950), (1000, 1000)]), [0, 100, 850, 900]);
+    }
+
+    #[test]
+    fn sixteen_bits_are_recognised() {
+        assert_eq!(times(&[(0, 59_000), (3000, 62_000), (7000, 464), (72_536, 464)]), [0, 0, 4000, 69_536]);
+    }
+}

@@ -1,0 +1,305 @@
+"""One table of operations gives the same results on the simulated bus, socketcand and slcan, and on SocketCAN if an
+interface is named. The judges are not cangauge's: python-can's socketcand client uses our server, a bridge written with
+python-can is the server for our client, python-can's slcan and an adapter written from the command set are at the other
+end of our pseudo terminals.
+
+    transports.py PROGRAM [INTERFACE]
+"""
+
+import contextlib
+import os
+import pty
+import re
+import select
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import tty
+
+import can
+
+from harness import Cangauge, wait_for
+
+DEVICES = ["mh4@1:pressure=2.5bar", "d20@2", "dps@127:pressure=14psi", "mc1609@3", "dps@9"]
+# Each uses its own node, because the simulated bus starts afresh with each command.
+OPERATIONS = [
+    ("scan",),
+    ("read", "1", "pressure"),
+    ("sdo", "read", "2", "0x1008"),
+    ("sdo", "read", "1", "0x1008", "--block", "always"),
+    ("sdo", "write", "3", "0x1017", "1000"),
+    ("sdo", "read", "1", "0x5FFF"),
+    ("pdo", "map", "127", "1", "pressure"),
+    ("store", "2"),
+    ("nmt", "reset", "3"),
+    ("log", "1", "pressure", "--sync", "50ms", "--count", "5"),
+    ("check", "127", "pressure < 1 psi", "--for", "500ms", "--poll", "50ms"),
+    ("lss", "set-id", "9", "12"),
+    ("log", "1", "--passive", "--device", "mh4", "--duration", "200ms"),
+]
+
+
+def plain(text):
+    """A text without times and their differences."""
+    text = re.sub(r"\d{4}-\d\d-\d\dT[\d:.]+Z,[\d.]+", "TIME", text)
+    return re.sub(r"\b\d+(\.\d+)? (us|ms|s)\b|\b[\d.]+/s\b", "N", text)
+
+
+def results(program, bus, operations=OPERATIONS):
+    cangauge = Cangauge(program, bus)
+    found = []
+    for operation in operations:
+        done = cangauge.run(*operation, exit=None)
+        found.append((" ".join(operation), done.exit, plain(done.out)))
+    return found
+
+
+def compare(name, found, expected):
+    for one, other in zip(found, expected):
+        assert one == other, f"{name}: {one}\non the simulated bus: {other}"
+    print(f"ok   {name}: {len(found)} operations", flush=True)
+
+
+@contextlib.contextmanager
+def served(program, directory):
+    """Simulated devices as a socketcand server. Yields the port."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    err = os.path.join(directory, f"{port}.err")
+    with open(err, "w") as file:
+        process = subprocess.Popen([program, "sim", *DEVICES, "--listen", str(port)], stderr=file, stdin=subprocess.DEVNULL)
+    try:
+        wait_for(lambda: "simulation is running" in open(err).read(), lambda: open(err).read(), process)
+        yield port
+    finally:
+        process.terminate()
+        assert process.wait() == 0
+
+
+def client(port):
+    return can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel="can0")
+
+
+def ask(bus, node, *request):
+    """An SDO answer to python-can."""
+    bus.send(can.Message(arbitration_id=0x600 + node, data=bytes(request).ljust(8, b"\0"), is_extended_id=False))
+    until = time.monotonic() + 20
+    while time.monotonic() < until:
+        message = bus.recv(1)
+        if message and message.arbitration_id == 0x580 + node:
+            return bytes(message.data)
+    raise AssertionError("no answer")
+
+
+class Thread(threading.Thread):
+    """A thread that ends with the block."""
+
+    def __init__(self):
+        super().__init__(daemon=True)
+        self.is_over = False
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.is_over = True
+        self.join()
+
+
+class Bridge(Thread):
+    """A socketcand server in front of a bus of python-can, written from the protocol's document. It cuts its text at odd
+    places."""
+
+    def __init__(self, bus):
+        super().__init__()
+        self.bus, self.listener = bus, socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+
+    def run(self):
+        self.listener.settimeout(0.1)
+        while not self.is_over:
+            with contextlib.suppress(TimeoutError, OSError):
+                self.serve(self.listener.accept()[0])
+
+    def serve(self, stream):
+        stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        while self.bus.recv(0):
+            pass
+        text, is_raw = "", False
+        stream.sendall(b"< hi >")
+        while not self.is_over:
+            if select.select([stream], [], [], 0 if is_raw else 0.05)[0]:
+                received = stream.recv(999)
+                if not received:
+                    return
+                text += received.decode()
+            while ">" in text:
+                words, text = text[: text.index(">")].strip("< ").split(), text[text.index(">") + 1 :]
+                if words[0] == "send":
+                    data = bytes(int(word, 16) for word in words[3:])
+                    assert len(data) == int(words[2])
+                    extended = len(words[1]) == 8
+                    self.bus.send(can.Message(arbitration_id=int(words[1], 16), is_extended_id=extended, data=data))
+                else:
+                    is_raw |= words[0] == "rawmode"
+                    stream.sendall(b"< ok >")
+            message = self.bus.recv(0.001) if is_raw else None
+            if message:
+                name = f"{message.arbitration_id:0{8 if message.is_extended_id else 3}X}"
+                line = f"< frame {name} {message.timestamp:.6f} {message.data.hex().upper()} >".encode()
+                cut = len(line) * 2 // 3
+                stream.sendall(line[:cut])
+                stream.sendall(line[cut:])
+
+
+class Adapter(Thread):
+    """A serial adapter in front of a bus of python-can, written from the command set of the LAWICEL adapters."""
+
+    def __init__(self, bus, end=b"\r", mute=False):
+        super().__init__()
+        self.bus, self.end, self.mute = bus, end, mute
+        self.master, slave = pty.openpty()
+        tty.setraw(slave)
+        self.path, self.slave = os.ttyname(slave), slave
+        self.is_open = self.has_stamps = False
+
+    def run(self):
+        text = b""
+        while not self.is_over:
+            if select.select([self.master], [], [], 0 if self.is_open else 0.05)[0]:
+                text += os.read(self.master, 999)
+            while b"\r" in text:
+                line, text = text.split(b"\r", 1)
+                answer = self.command(line.decode())
+                if not self.mute:
+                    os.write(self.master, answer)
+            message = self.bus.recv(0.001) if self.is_open else None
+            if message and not message.is_error_frame:
+                kind, digits = ("T", 8) if message.is_extended_id else ("t", 3)
+                stamp = f"{int(message.timestamp * 1000) % 60000:04X}" if self.has_stamps else ""
+                line = f"{kind}{message.arbitration_id:0{digits}X}{message.dlc}{message.data.hex().upper()}{stamp}\r"
+                os.write(self.master, line.encode())
+
+    def command(self, line):
+        if line[:1] in ("t", "T"):
+            digits = 3 if line[0] == "t" else 8
+            data = bytes.fromhex(line[2 + digits :])
+            assert len(data) == int(line[1 + digits]), line
+            self.bus.send(can.Message(arbitration_id=int(line[1 : 1 + digits], 16), is_extended_id=digits == 8, data=data))
+            return b"z" + self.end
+        if line in ("V", "N", "F"):
+            return {"V": b"V1013", "N": b"NA123", "F": b"F00"}[line] + self.end
+        if line in ("O", "L", "C"):
+            self.is_open = line != "C"
+            while self.is_open and self.bus.recv(0):
+                pass
+        self.has_stamps |= line == "Z1"
+        return b"\x07" if line == "v" else self.end
+
+
+class Wire(Thread):
+    """Passes frames between two buses of python-can."""
+
+    def __init__(self, *buses):
+        super().__init__()
+        self.buses = buses
+
+    def run(self):
+        def move(source, target):
+            while not self.is_over:
+                message = source.recv(0.1)
+                if message and not message.is_error_frame:
+                    message.channel = None
+                    target.send(message)
+
+        first, second = self.buses
+        other = threading.Thread(target=move, args=(second, first), daemon=True)
+        other.start()
+        move(first, second)
+        other.join()
+
+
+def two_clients(port):
+    """python-can as a client of our server, twice: both reach the devices and see each other."""
+    with client(port) as one, client(port) as two:
+        assert ask(one, 1, 0x40, 0x00, 0x10) == bytes.fromhex("4300100094018200"), "1000h of mh4"
+        one.send(can.Message(arbitration_id=0x18FF0001, is_extended_id=True, data=b"\x01\xa0"))
+        until = time.monotonic() + 20
+        seen = []
+        while time.monotonic() < until and not any(message.is_extended_id for message in seen):
+            seen += [message for message in [two.recv(1)] if message]
+        assert (seen[-1].arbitration_id, bytes(seen[-1].data)) == (0x18FF0001, b"\x01\xa0")
+    print("ok   python-can's socketcand client: two at once", flush=True)
+
+
+def round_trip(program, bus):
+    """The time of one SDO read, from the trace of a program that reads the same object many times."""
+    with tempfile.TemporaryDirectory() as directory:
+        trace = os.path.join(directory, "trace")
+        for _ in range(3):
+            Cangauge(program, bus).run("--trace", trace, "sdo", "read", "1", "0x1000")
+        lines = [line.split() for line in open(trace)]
+        times = [float(time.strip("()")) for time, _, frame in lines if frame.startswith(("601#40", "581#"))]
+        return (times[-1] - times[-2]) * 1000
+
+
+def main(program, interface=None):
+    directory = tempfile.mkdtemp()
+    sim = "sim:" + ",".join(DEVICES)
+    expected = results(program, sim)
+    exits = dict((operation, code) for operation, code, _ in expected)
+    assert exits["check 127 pressure < 1 psi --for 500ms --poll 50ms"] == 1 and list(exits.values()).count(0) == 10, exits
+    times = {"sim": round_trip(program, sim)}
+
+    with served(program, directory) as port:
+        bus = f"socketcand://127.0.0.1:{port}/can0"
+        compare("socketcand, our server", results(program, bus), expected)
+        times["socketcand"] = round_trip(program, bus)
+        two_clients(port)
+    with served(program, directory) as port, client(port) as behind, Bridge(behind) as bridge:
+        compare("socketcand, a bridge of python-can", results(program, f"socketcand://127.0.0.1:{bridge.port}/can0"), expected)
+    with served(program, directory) as port, client(port) as behind, Adapter(behind) as adapter:
+        bus = f"slcan:{adapter.path}@250k"
+        compare("slcan, an adapter from the command set", results(program, bus), expected)
+        times["slcan"] = round_trip(program, bus)
+    some = [operation for operation in OPERATIONS if operation[0] in ("scan", "read", "store", "log") and "--passive" not in operation]
+    wanted = [one for one in expected if one[0] in [" ".join(operation) for operation in some]]
+    with served(program, directory) as port, client(port) as behind, Adapter(behind, b"\r\n", mute=True) as adapter:
+        compare("slcan, an adapter that answers nothing", results(program, f"slcan:{adapter.path}@250k", some), wanted)
+    with served(program, directory) as port, client(port) as behind:
+        master, slave = pty.openpty()
+        tty.setraw(slave)
+        other, path = pty.openpty()
+        tty.setraw(path)
+        with can.Bus(interface="slcan", channel=os.ttyname(slave), bitrate=250000, sleep_after_open=0) as foreign:
+            with Wire(foreign, behind), Cable(master, other):
+                compare("slcan, python-can's slcan", results(program, f"slcan:{os.ttyname(path)}@250k", some), wanted)
+    if interface:
+        with Cangauge(program, interface).running("sim", *DEVICES, directory=directory) as simulator:
+            simulator.await_words("simulation is running")
+            compare(f"SocketCAN, {interface}", results(program, interface), expected)
+            times[interface] = round_trip(program, interface)
+    print("one SDO read: " + ", ".join(f"{name} {time:.2f} ms" for name, time in times.items()))
+
+
+class Cable(Thread):
+    """Joins two pseudo terminals."""
+
+    def __init__(self, *ends):
+        super().__init__()
+        self.ends = ends
+
+    def run(self):
+        while not self.is_over:
+            for end in select.select(self.ends, [], [], 0.1)[0]:
+                with contextlib.suppress(OSError):
+                    os.write(self.ends[self.ends.index(end) ^ 1], os.read(end, 999))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
