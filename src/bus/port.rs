@@ -6,7 +6,7 @@ use socket2::{Domain, Protocol, SockAddr, Socket, TcpKeepalive, Type};
 use std::fmt;
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, ToSocketAddrs};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Where a byte stream is opened.
@@ -100,6 +100,38 @@ impl Port {
     }
 }
 
+/// A serial port that may be an adapter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SerialAdapter {
+    /// The device: `/dev/ttyACM0`.
+    pub path: String,
+    /// The product, as its USB descriptor names it.
+    pub product: Option<String>,
+}
+
+/// The serial ports of USB adapters, sorted.
+pub fn adapters() -> Vec<SerialAdapter> {
+    let ports = SerialPort::available_ports().unwrap_or_default();
+    let mut found: Vec<SerialAdapter> =
+        ports.iter().filter_map(|path| adapter(path, Path::new("/sys/class/tty"))).collect();
+    found.sort_by(|a, b| (a.path.len(), &a.path).cmp(&(b.path.len(), &b.path)));
+    found
+}
+
+/// The adapter at a port; `None` for a port of the computer itself, such as `ttyS0`.
+fn adapter(path: &Path, sysfs: &Path) -> Option<SerialAdapter> {
+    let name = path.file_name()?.to_str()?;
+    if name.starts_with("ttyS") || name.starts_with("ttyAMA") {
+        return None;
+    }
+    // ttyACM0: its USB interface, in the device. ttyUSB0: one more level in between.
+    let product = ["../product", "../../product"].into_iter().find_map(|up| {
+        let text = std::fs::read_to_string(sysfs.join(name).join("device").canonicalize().ok()?.join(up)).ok()?;
+        Some(super::stream::printable(text.trim()))
+    });
+    Some(SerialAdapter { path: path.to_str()?.to_owned(), product })
+}
+
 fn is_pending(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     // A connection that has begun.
@@ -162,4 +194,31 @@ pub(super) fn wait(
 pub(super) fn wait(sources: &[(&dyn Waitable, bool)], _: &mut Interrupts, limit: Duration) -> io::Result<Vec<bool>> {
     std::thread::sleep(limit.min(Duration::from_millis(1)));
     Ok(vec![true; sources.len()])
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usb_adapters_have_the_name_of_their_product() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let sysfs = folder.path().join("class");
+        for (name, interface) in [("ttyACM0", "usb1/1-1/1-1:1.0"), ("ttyUSB3", "usb1/1-2/1-2:1.0/ttyUSB3")] {
+            let interface = folder.path().join(interface);
+            std::fs::create_dir_all(&interface).expect("a folder");
+            std::fs::create_dir_all(sysfs.join(name)).expect("a folder");
+            std::os::unix::fs::symlink(interface, sysfs.join(name).join("device")).expect("a link");
+        }
+        std::fs::write(folder.path().join("usb1/1-1/product"), "CANable \x1b b158aa7\n").expect("written");
+        std::fs::write(folder.path().join("usb1/1-2/product"), "USB Serial").expect("written");
+        let found = |name: &str| adapter(&Path::new("/dev").join(name), &sysfs);
+        let adapter = |path: &str, product: Option<&str>| {
+            Some(SerialAdapter { path: path.to_owned(), product: product.map(str::to_owned) })
+        };
+        assert_eq!(found("ttyACM0"), adapter("/dev/ttyACM0", Some("CANable ? b158aa7")));
+        assert_eq!(found("ttyUSB3"), adapter("/dev/ttyUSB3", Some("USB Serial")));
+        assert_eq!(found("ttyGS0"), adapter("/dev/ttyGS0", None));
+        assert_eq!(found("ttyS0"), None);
+    }
 }

@@ -1,6 +1,7 @@
 //! The names of buses behind a byte stream, and which transport serves each of them.
 
 use super::port::Place;
+pub use super::port::{SerialAdapter, adapters};
 use super::slcan::Slcan;
 use super::socketcand::Client;
 use super::stream::StreamBus;
@@ -89,7 +90,8 @@ impl fmt::Display for Remote {
 /// `HOST[:PORT]/BUS`.
 fn socketcand(text: &str) -> Option<(Place, String)> {
     let (host, bus) = text.split_once('/')?;
-    let is_word = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic() && !b"<>/".contains(&byte));
+    let is_word =
+        |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic() && !b"<>/".contains(&byte));
     let place = tcp(host, Some(SOCKETCAND_PORT))?;
     is_word(bus).then(|| (place, bus.to_owned()))
 }
@@ -119,7 +121,10 @@ fn slcan(text: &str) -> Result<(Place, u32), String> {
     };
     let Some((device, rate)) = text.rsplit_once('@').filter(|(device, rate)| !device.is_empty() && !rate.is_empty())
     else {
-        return Err(format!("slcan:{text} needs the bit rate of the bus, for example slcan:{}@250k", text.trim_end_matches('@')));
+        return Err(format!(
+            "slcan:{text} needs the bit rate of the bus, for example slcan:{}@250k",
+            text.trim_end_matches('@')
+        ));
     };
     let rate = bit_rate(rate)?;
     let place = match device.strip_prefix("tcp://") {

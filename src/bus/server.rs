@@ -7,14 +7,48 @@ use super::socketcand::{Messages, frame_message, sent_frame};
 use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
 use std::collections::VecDeque;
+use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 /// A client that leaves more bytes than this unread is disconnected.
 const MAX_WAITING: usize = 256 * 1024;
 /// More clients than this are not accepted.
 const MAX_CLIENTS: usize = 64;
+
+/// Where a server listens: `29536` on this computer only, `0.0.0.0:29536`, `[::]:29536`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Address(SocketAddr);
+
+impl Address {
+    /// Whether only programs on this computer can connect.
+    pub fn is_local(self) -> bool {
+        self.0.ip().is_loopback()
+    }
+
+    /// The TCP port.
+    pub fn port(self) -> u16 {
+        self.0.port()
+    }
+}
+
+impl FromStr for Address {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Address, String> {
+        let port = text.parse().map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
+        let address = port.or_else(|_| text.parse());
+        address.map(Address).map_err(|_| format!("\"{text}\" is not PORT or ADDRESS:PORT (29536, 0.0.0.0:29536)"))
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
 
 /// A socketcand server. Each name of a bus that a client opens is this bus.
 pub struct Server {
@@ -103,9 +137,9 @@ impl Server {
     ///
     /// # Errors
     /// The address is in use, or not one of this host.
-    pub fn listen(address: SocketAddr) -> Result<Server, BusError> {
+    pub fn listen(address: Address) -> Result<Server, BusError> {
         let failed = |source| BusError::Io { what: format!("listen at {address}"), source };
-        let listener = TcpListener::bind(address).map_err(failed)?;
+        let listener = TcpListener::bind(address.0).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
         Ok(Server {
             name: format!("socketcand {}", listener.local_addr().map_err(failed)?),
@@ -122,8 +156,8 @@ impl Server {
     ///
     /// # Errors
     /// Those of the system.
-    pub fn address(&self) -> io::Result<SocketAddr> {
-        self.listener.local_addr()
+    pub fn address(&self) -> io::Result<Address> {
+        self.listener.local_addr().map(Address)
     }
 
     fn accept(&mut self) {

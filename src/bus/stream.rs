@@ -234,7 +234,8 @@ impl<P: Protocol> StreamBus<P> {
             Link::Connecting(port, _) => (Some(port), true),
             Link::Up(port) => (Some(port), !self.out.bytes.is_empty()),
         };
-        let sources: Vec<(&dyn Waitable, bool)> = port.map(|port| (port as &dyn Waitable, writes)).into_iter().collect();
+        let sources: Vec<(&dyn Waitable, bool)> =
+            port.map(|port| (port as &dyn Waitable, writes)).into_iter().collect();
         let ready = match wait(&sources, &mut self.interrupts, limit) {
             Ok(ready) => ready.first().copied().unwrap_or(false),
             Err(error) => return self.fail(plain(&error)),

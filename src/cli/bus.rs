@@ -6,8 +6,9 @@ use super::args::{BitRate, BusSpec, Duration, InterfaceName};
 use super::exit::IntoFailure;
 use super::{Global, open};
 use crate::bus::claim::Claim;
+use crate::bus::remote::{SerialAdapter, adapters};
 use crate::output::failure::ErrorMessage;
-use crate::output::interfaces::{BitRateReport, change, tried_line};
+use crate::output::interfaces::{BitRateReport, Interface, change, tried_line};
 use crate::tasks::Failure;
 use crate::tasks::detect::{By, DetectFailure, How, detect};
 use clap::{Args, Subcommand};
@@ -26,7 +27,7 @@ pub(crate) struct BusCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List the CAN interfaces of this computer with bit rate, state and error counters
+    /// List the CAN interfaces of this computer with bit rate, state and error counters, and the serial adapters
     List,
     /// Bring an interface up at a bit rate
     ///
@@ -62,7 +63,7 @@ struct Down {
 
 #[derive(Debug, Args)]
 struct Detect {
-    /// Bus: can0, sim:FILE.toml [default: --bus]
+    /// Bus: can0, slcan:/dev/ttyACM0@250k, sim:FILE.toml [default: --bus]
     #[arg(value_name = "BUS")]
     on: Option<BusSpec>,
     /// If nothing is received, ask each node-ID for its device type at each bit rate. Only for a bench with one
@@ -83,9 +84,9 @@ impl BusCommand {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             Action::List => {
-                let all = host::list();
+                let all: Vec<_> = host::list().into_iter().chain(adapters().into_iter().map(serial)).collect();
                 if all.is_empty() {
-                    global.console().note("this computer has no CAN interface");
+                    global.console().note("this computer has no CAN interface and no serial adapter");
                 }
                 global.print(&all)
             }
@@ -96,6 +97,18 @@ impl BusCommand {
             Action::Down(down) => report(&host::down(&down.interface.0)?, global),
             Action::Detect(detect) => detect.run(global),
         }
+    }
+}
+
+/// A serial adapter as an interface. Its bit rate is chosen when it is opened.
+fn serial(found: SerialAdapter) -> Interface {
+    let kind = Some("serial".to_owned());
+    Interface {
+        interface: format!("slcan:{}", found.path),
+        up: false,
+        driver: found.product,
+        kind,
+        ..Interface::default()
     }
 }
 

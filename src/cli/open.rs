@@ -165,7 +165,8 @@ fn interrupted(error: BusError) -> Failure {
 
 /// Why an interface cannot be opened yet.
 fn is_missing(error: &BusError) -> Option<String> {
-    matches!(error, BusError::NoInterface(_) | BusError::Down(_) | BusError::Unreachable { .. }).then(|| error.to_string())
+    matches!(error, BusError::NoInterface(_) | BusError::Down(_) | BusError::Unreachable { .. })
+        .then(|| error.to_string())
 }
 
 /// Tries again, as long as `--wait` allows, while `obstacle` names something that may change.

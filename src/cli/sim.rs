@@ -6,20 +6,17 @@ use super::{Global, open};
 use crate::bus::Bus;
 use crate::bus::claim::Claim;
 use crate::bus::memory::Station;
-use crate::bus::server::Server;
+use crate::bus::server::{Address, Server};
 use crate::output::failure::ErrorMessage;
 use crate::sim;
 use clap::Args;
-use std::net::{Ipv4Addr, SocketAddr};
 
 /// Simulate devices on a bus until Ctrl-C
 ///
 /// The devices answer, send and fail as described in their manuals. Use them to test other programs.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  cangauge -b vcan0 sim mh4@5 dps@127\n  cangauge -b vcan0 sim bench.toml\n  \
-                  cangauge sim mh4@5 --listen 29536      then: cangauge -b socketcand://localhost/can0 scan"
-)]
+#[command(after_help = "Examples:\n  cangauge -b vcan0 sim mh4@5 dps@127\n  cangauge -b vcan0 sim bench.toml\n  \
+                  cangauge sim mh4@5 --listen 29536      then: cangauge -b socketcand://localhost/can0 scan")]
 pub(crate) struct Sim {
     /// Devices: mh4@5 dps@127, mh4@unconfigured for one without a node-ID, mh4@5:pressure=0bar with a constant value,
     /// FILE.eds@5 from an EDS; or a bench file in TOML
@@ -27,14 +24,8 @@ pub(crate) struct Sim {
     devices: Vec<String>,
     /// Serve the devices at this TCP port to other programs, as a socketcand server, in place of a bus. Without an
     /// address, only programs on this computer can connect
-    #[arg(long, value_name = "[ADDR:]PORT", value_parser = address)]
-    listen: Option<SocketAddr>,
-}
-
-/// `29536`, `0.0.0.0:29536`, `[::]:29536`.
-fn address(text: &str) -> Result<SocketAddr, String> {
-    let port = text.parse().map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
-    port.or_else(|_| text.parse()).map_err(|_| format!("\"{text}\" is not PORT or ADDRESS:PORT (29536, 0.0.0.0:29536)"))
+    #[arg(long, value_name = "[ADDR:]PORT")]
+    listen: Option<Address>,
 }
 
 impl Sim {
@@ -58,7 +49,7 @@ impl Sim {
 }
 
 /// A server of which the devices are the bus.
-fn serve(global: &Global, address: SocketAddr) -> anyhow::Result<Box<dyn Bus>> {
+fn serve(global: &Global, address: Address) -> anyhow::Result<Box<dyn Bus>> {
     if global.bus.is_some() {
         return Err(ErrorMessage::usage("--listen serves the devices in place of a bus: omit --bus").into());
     }
@@ -66,7 +57,7 @@ fn serve(global: &Global, address: SocketAddr) -> anyhow::Result<Box<dyn Bus>> {
     let address = server.address().map_err(|source| FileError { what: "listen".to_owned(), source })?;
     let (console, port) = (global.console(), address.port());
     console.note(&format!("serving at {address}: cangauge -b socketcand://localhost:{port}/can0 scan"));
-    if !address.ip().is_loopback() {
+    if !address.is_local() {
         console.warn(&format!("any computer that reaches {address} can use the simulated devices"));
     }
     open::traced(global, Box::new(server))

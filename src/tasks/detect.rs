@@ -247,7 +247,12 @@ fn is_error(fault: Fault) -> bool {
         | Fault::NoAcknowledge
         | Fault::Protocol
         | Fault::TransmitTimeout => true,
-        Fault::ErrorActive | Fault::Restarted | Fault::ControllerOverflow | Fault::Transceiver | Fault::Garbled | Fault::Other => false,
+        Fault::ErrorActive
+        | Fault::Restarted
+        | Fault::ControllerOverflow
+        | Fault::Transceiver
+        | Fault::Garbled
+        | Fault::Other => false,
     }
 }
 

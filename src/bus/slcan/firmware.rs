@@ -37,9 +37,10 @@ impl Firmware {
     fn kind(&self) -> Kind {
         let answers = || [&self.version, &self.detail, &self.serial].into_iter().flatten();
         let is_plain = |answer: &Option<String>, first: char| {
-            answer.as_ref().and_then(|text| text.strip_prefix(first)).is_some_and(|rest| {
-                rest.len() == 4 && rest.bytes().all(|byte| byte.is_ascii_alphanumeric())
-            })
+            answer
+                .as_ref()
+                .and_then(|text| text.strip_prefix(first))
+                .is_some_and(|rest| rest.len() == 4 && rest.bytes().all(|byte| byte.is_ascii_alphanumeric()))
         };
         if answers().any(|answer| answer.to_ascii_lowercase().contains("canable")) {
             Kind::Canable
@@ -101,10 +102,10 @@ mod tests {
         assert_eq!(digits(&lawicel), [Some(0), Some(5), Some(8), Some(7), None, None, None]);
         assert_eq!(digits(&usbtin), digits(&lawicel));
         assert_eq!(digits(&canable), [Some(0), Some(5), Some(8), None, Some(7), Some(9), None]);
-        assert_eq!((lawicel.listen_only(), canable.listen_only()), (
-            Some(ListenOnly::OtherOpen),
-            Some(ListenOnly::SilentMode)
-        ));
+        assert_eq!(
+            (lawicel.listen_only(), canable.listen_only()),
+            (Some(ListenOnly::OtherOpen), Some(ListenOnly::SilentMode))
+        );
         for unknown in [Firmware::default(), firmware("V1013", "", ""), firmware("V2.1 wifi", "", "NA123")] {
             assert_eq!(digits(&unknown), [Some(0), Some(5), Some(8), None, None, None, None]);
             assert_eq!(unknown.listen_only(), None);

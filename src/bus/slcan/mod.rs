@@ -155,7 +155,9 @@ impl Slcan {
         let Some((bit_rate, mode)) = self.channel else { return Ok(Vec::new()) };
         let digit = self.firmware.rate_digit(bit_rate).ok_or_else(|| {
             let adapter = &self.firmware;
-            format!("{adapter} is not known to have {bit_rate} bit/s (all have 10k, 20k, 50k, 100k, 125k, 250k, 500k, 1M)")
+            format!(
+                "{adapter} is not known to have {bit_rate} bit/s (all have 10k, 20k, 50k, 100k, 125k, 250k, 500k, 1M)"
+            )
         })?;
         let mut steps = vec![Step::Rate(digit), Step::Stamps];
         let listen_only = self.firmware.listen_only();

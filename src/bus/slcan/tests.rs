@@ -82,7 +82,8 @@ struct Bench {
 
 impl Bench {
     fn new(adapter: Adapter, bit_rate: u32, mode: Option<Mode>) -> Bench {
-        let mut bench = Bench { slcan: Slcan::new(bit_rate, mode), adapter, out: Output::default(), now: Duration::ZERO };
+        let mut bench =
+            Bench { slcan: Slcan::new(bit_rate, mode), adapter, out: Output::default(), now: Duration::ZERO };
         bench.slcan.start(at(bench.now), &mut bench.out);
         bench
     }
@@ -147,7 +148,8 @@ fn channel_is_opened_step_by_step() {
     assert_eq!(commands(&bench), "C V v N S5 Z1 O F");
     assert!(bench.now < Duration::from_millis(200), "{:?}", bench.now);
     assert_eq!(bench.slcan.timestamps(), TimestampSource::Hardware);
-    let canable = Adapter { version: ["CANable-3ab9e32", "", ""], end: "\r\n", rejects: vec!["Z1"], ..Adapter::default() };
+    let canable =
+        Adapter { version: ["CANable-3ab9e32", "", ""], end: "\r\n", rejects: vec!["Z1"], ..Adapter::default() };
     let bench = Bench::opened(canable, 750_000, normal).expect("opened");
     assert_eq!(commands(&bench), "C V v N S7 Z1 M0 O F");
     assert_eq!(bench.slcan.timestamps(), TimestampSource::Program);
@@ -176,10 +178,7 @@ fn rates_and_modes_that_are_not_certain_are_refused() {
     let error = |adapter, bit_rate, mode| Bench::opened(adapter, bit_rate, Some(mode)).err().expect("an error");
     let why = error(unknown(), 800_000, Mode::Normal);
     assert!(why.starts_with("the adapter (Vx) is not known to have 800000 bit/s"), "{why}");
-    assert_eq!(
-        error(unknown(), 250_000, Mode::ListenOnly),
-        "the adapter (Vx) is not known to have a listen-only mode"
-    );
+    assert_eq!(error(unknown(), 250_000, Mode::ListenOnly), "the adapter (Vx) is not known to have a listen-only mode");
     let mute = Adapter { is_mute: true, ..Adapter::default() };
     let why = error(mute, 250_000, Mode::ListenOnly);
     assert_eq!(why, "an adapter without a known version is not known to have a listen-only mode");
@@ -192,11 +191,16 @@ fn rates_and_modes_that_are_not_certain_are_refused() {
 
 #[test]
 fn rejected_frames_are_sent_again() {
-    let mut bench = Bench::opened(Adapter { is_full_for: 3, ..Adapter::lawicel() }, 250_000, Some(Mode::Normal)).expect("opened");
+    let mut bench =
+        Bench::opened(Adapter { is_full_for: 3, ..Adapter::lawicel() }, 250_000, Some(Mode::Normal)).expect("opened");
     bench.send("080#").expect("sent");
     bench.send("701#R").expect("sent");
     bench.run(bench.now + Duration::from_millis(100), |slcan| !slcan.is_busy()).expect("no error");
-    assert!(bench.adapter.commands.ends_with(&["t0800".to_owned(), "r7010".to_owned()]), "{:?}", bench.adapter.commands);
+    assert!(
+        bench.adapter.commands.ends_with(&["t0800".to_owned(), "r7010".to_owned()]),
+        "{:?}",
+        bench.adapter.commands
+    );
     assert_eq!(bench.events(), [""; 0]);
     // No node acknowledges.
     bench.adapter.is_full_for = u32::MAX;
@@ -236,7 +240,8 @@ fn error_flags_are_asked_for_and_reported() {
 
 #[test]
 fn bit_rate_is_changed_and_restored() {
-    let mut bench = Bench::opened(Adapter { rejects: vec!["S6"], ..Adapter::lawicel() }, 250_000, None).expect("opened");
+    let mut bench =
+        Bench::opened(Adapter { rejects: vec!["S6"], ..Adapter::lawicel() }, 250_000, None).expect("opened");
     assert_eq!((commands(&bench).as_str(), bench.slcan.bit_rate()), ("C V v N", Some(250_000)));
     let mut set = |to, commands: &[&str]| {
         bench.adapter.commands.clear();

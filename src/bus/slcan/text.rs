@@ -118,7 +118,9 @@ mod tests {
 
     #[test]
     fn frames_round_trip() {
-        for text in ["t60584000100000000000", "t0800", "T0000018A3AABBCC", "r7011", "R1FFFFFFF8", "t1FF80102030405060708"] {
+        for text in
+            ["t60584000100000000000", "t0800", "T0000018A3AABBCC", "r7011", "R1FFFFFFF8", "t1FF80102030405060708"]
+        {
             let [Answer::Frame(frame, None)] = &answers(format!("{text}\r").as_bytes())[..] else { panic!("{text}") };
             assert_eq!(command(frame), text);
             let [Answer::Frame(timed, Some(0xea5f))] = &answers(format!("{text}EA5F\r\n").as_bytes())[..] else {
@@ -130,16 +132,16 @@ mod tests {
 
     #[test]
     fn damaged_lines_are_garbage() {
-        for line in ["t", "t60", "t6059", "t60584000", "t8000", "t605+", "T2000000000", "r7019", "t0800123", "t08001234567"] {
+        for line in
+            ["t", "t60", "t6059", "t60584000", "t8000", "t605+", "T2000000000", "r7019", "t0800123", "t08001234567"]
+        {
             assert_eq!(answers(format!("{line}\r").as_bytes()), [Answer::Garbage], "{line}");
         }
         assert_eq!(answers(b"t6\xff058\rz\r"), [Answer::Garbage, Answer::Done]);
-        assert_eq!(answers(&[&[b't'; 1 << 20][..], b"\r\r\x07V1013\r"].concat()), [
-            Answer::Garbage,
-            Answer::Done,
-            Answer::Rejected,
-            Answer::Text("V1013".to_owned())
-        ]);
+        assert_eq!(
+            answers(&[&[b't'; 1 << 20][..], b"\r\r\x07V1013\r"].concat()),
+            [Answer::Garbage, Answer::Done, Answer::Rejected, Answer::Text("V1013".to_owned())]
+        );
     }
 
     #[test]

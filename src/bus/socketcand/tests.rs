@@ -114,6 +114,10 @@ fn remote(address: SocketAddr) -> Remote {
     Remote::parse(&format!("socketcand://{address}/can0")).expect("remote").expect("a name")
 }
 
+fn address(server: &Server) -> SocketAddr {
+    server.address().expect("an address").to_string().parse().expect("an address")
+}
+
 /// Reads up to the end of a message.
 fn hear(stream: &mut TcpStream) -> String {
     let (mut text, mut byte) = (String::new(), [0]);
@@ -204,13 +208,16 @@ fn a_server_that_does_not_read_fills_the_queue() {
     assert!(!bus.sends_remote_frames());
     drop(sender);
     thread.join().expect("the server");
-    assert!(matches!(open_client().send(&remote, Stamp::default(), &mut Output::default()), Err(BusError::Unsupported(_))));
+    assert!(matches!(
+        open_client().send(&remote, Stamp::default(), &mut Output::default()),
+        Err(BusError::Unsupported(_))
+    ));
 }
 
 #[test]
 fn clients_of_our_server_receive_each_other() {
     let mut server = Server::listen("127.0.0.1:0".parse().expect("an address")).expect("listening");
-    let bus = remote(server.address().expect("an address"));
+    let bus = remote(address(&server));
     let clients = thread::spawn(move || {
         let mut clients = [bus.open(Use::Normal).expect("opened"), bus.open(Use::Normal).expect("opened")];
         clients[0].send(&"18FF0001#0102".parse().expect("a frame")).expect("sent");
@@ -238,10 +245,10 @@ fn clients_of_our_server_receive_each_other() {
     server.send(&"705#7F".parse().expect("a frame")).expect("sent");
     let _ = server.receive(server.mono() + Duration::from_millis(50));
     let [first, second] = clients.join().expect("the clients");
-    assert_eq!((first, second), (vec!["000#".to_owned(), "705#7F".to_owned()], vec![
-        "18FF0001#0102".to_owned(),
-        "705#7F".to_owned()
-    ]));
+    assert_eq!(
+        (first, second),
+        (vec!["000#".to_owned(), "705#7F".to_owned()], vec!["18FF0001#0102".to_owned(), "705#7F".to_owned()])
+    );
     frames.sort();
     assert_eq!(frames, ["000#", "18FF0001#0102"]);
 }
@@ -249,7 +256,7 @@ fn clients_of_our_server_receive_each_other() {
 #[test]
 fn our_server_survives_odd_clients() {
     let mut server = Server::listen("127.0.0.1:0".parse().expect("an address")).expect("listening");
-    let address = server.address().expect("an address");
+    let address = address(&server);
     let client = thread::spawn(move || {
         let mut stream = TcpStream::connect(address).expect("connected");
         assert_eq!(hear(&mut stream), "< hi >");
