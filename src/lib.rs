@@ -5,7 +5,7 @@
 //!
 //! # Layers
 //!
-//! Each layer uses only the layers named after its arrow. `tests/layers.rs` checks this.
+//! Each layer uses only the layers after its arrow. `tests/layers.rs` checks this.
 //!
 //! - [`canopen`] → nothing. The protocols of CiA 301 and CiA 305 as state machines and codecs. Decoding is total:
 //!   each frame of 0 to 8 bytes gives a result or an error. No I/O, no clock, no device names.
@@ -18,8 +18,8 @@
 //!   expressions. It drives no bus.
 //! - [`node`] → master, measure, device, canopen, bus (the trait). One node: its identity, signals and TPDOs, and how it
 //!   is read, written and waited for.
-//! - [`sim`] → bus, device, canopen (values). Simulated devices. They are written from the standard and the manuals, not
-//!   with the encoders of the client.
+//! - [`sim`] → bus, device, canopen (values). Simulated devices. They are written from the standard and the manuals,
+//!   without the encoders of the client.
 //! - [`tasks`] → node, measure, master, device, canopen, bus (the trait). The procedures of the commands: set a node-ID,
 //!   map a TPDO, record, check. They return typed reports and typed failures, and print nothing.
 //! - [`output`] → tasks (reports), node, measure, device, canopen (values), bus (moments, faults). All sentences, tables
@@ -45,7 +45,7 @@
 //! master.listen_to(&ids)?;
 //! for node in survey_nodes(&mut master, &ids, &Overrides::new())? {
 //!     for signal in &node.signals {
-//!         let (object, Some(data_type)) = signal.value else { continue };
+//!         let (object, Some(data_type)) = signal.value_object else { continue };
 //!         let value = master.read(node.id, object, data_type)??;
 //!         let number = Number::from_value(&value, signal.digits.unwrap_or(0)).ok_or("not a number")?;
 //!         let unit = signal.unit.map(|unit| unit.to_string()).unwrap_or_default();

@@ -43,7 +43,7 @@ impl FromStr for BitRate {
     }
 }
 
-/// Which nodes: `5`, `0x7f`, `1-16`, `1,5,0x10-0x1f`, `all`.
+/// Nodes: `5`, `0x7f`, `1-16`, `1,5,0x10-0x1f`, `all`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Nodes {
     /// All nodes on the bus.
@@ -53,7 +53,7 @@ pub enum Nodes {
 }
 
 impl Nodes {
-    /// Claims these nodes.
+    /// The claim of these nodes.
     pub(super) fn claim(&self) -> Claim {
         match self {
             Nodes::All => Claim::every_node(),
@@ -129,7 +129,7 @@ fn is_name(text: &str) -> bool {
         && text.chars().all(|character| character.is_ascii_alphanumeric() || character == '-' || character == '_')
 }
 
-/// Whether a text looks like an address although it is not valid: `12345`, `6130:300`.
+/// Whether a text looks like an address but is not valid: `12345`, `6130:300`.
 fn is_like_address(text: &str) -> bool {
     let is_part = |character: char| character.is_ascii_hexdigit() || "xXhH:.".contains(character);
     text.starts_with(|first: char| first.is_ascii_digit()) && text.chars().all(is_part)
@@ -167,7 +167,7 @@ impl fmt::Display for ObjectArg {
     }
 }
 
-/// Which bus.
+/// The bus of `--bus`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BusSpec {
     /// A SocketCAN interface.

@@ -68,7 +68,7 @@ fn parse_limit(text: &str) -> Result<Limit, String> {
 }
 
 impl Autozero {
-    /// The nodes, for this command alone.
+    /// The nodes that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         self.nodes.claim()
     }

@@ -13,7 +13,7 @@ use crate::tasks::Failure;
 use crate::tasks::detect::{By, DetectFailure, How, detect};
 use clap::{Args, Subcommand};
 
-/// List CAN interfaces, bring them up and down, find the bit rate of a bus
+/// List CAN interfaces, bring them up and down, and find the bit rate of a bus
 ///
 /// Setting an interface needs root (CAP_NET_ADMIN). Without it, the error shows the commands to type.
 #[derive(Debug, Args)]
@@ -31,8 +31,8 @@ enum Action {
     List,
     /// Bring an interface up at a bit rate
     ///
-    /// An interface that is already up at this bit rate stays as it is. One that is up at another bit rate goes down
-    /// for a moment. Only the bit rate, the listen-only mode and the link are set. They are read back.
+    /// If the interface is up at another bit rate, it goes down for a moment. If it is already up at this bit rate,
+    /// nothing is changed. Only the bit rate, the listen-only mode and the link are set, and then read back.
     Up(Up),
     /// Bring an interface down
     Down(Down),
@@ -76,7 +76,7 @@ struct Detect {
 }
 
 impl BusCommand {
-    /// Nothing: other cangauges may use every node.
+    /// No claim: other cangauges may use all nodes.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nothing
     }

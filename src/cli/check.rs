@@ -23,10 +23,10 @@ use clap::Args;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)
+/// Check measurements against limits (exit code 0: all satisfied, 1: not satisfied, 3: no data)
 ///
-/// Without --for, one reading by SDO is checked. With --for, the command records like log for that time, and checks each
-/// sample. With -b replay:FILE, each sample of the file is checked. An invalid sample fails the check.
+/// Without --for, one reading by SDO is checked. With --for, the command records like log for this time, and checks
+/// each sample. With -b replay:FILE, each sample of the file is checked. An invalid sample fails the check.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Expressions (quote each of them; all must be satisfied):
@@ -78,7 +78,7 @@ impl Check {
         self.validate(global)?;
         let file = self.junit.as_deref().map(|path| ReportFile::create(path, false)).transpose()?;
         let report = match self.measure(global) {
-            // A CI server needs the report if nothing was measured, too.
+            // A CI server also needs a report if nothing was measured.
             Err(error) if file.is_some() => {
                 let failure = error.downcast_ref::<Failure>().filter(|failure| failure.kind() != Kind::Usage);
                 if let (Some(failure), Some(file)) = (failure, file) {
@@ -125,7 +125,7 @@ impl Check {
         let progress = CheckProgress::new(duration.is_some() && global.shows_progress(), duration.unwrap_or_default());
         let console = Console { progress: Some(progress.multi()), ..global.console() };
         global.with_claims(|master, claims| {
-            // A recording (replay:) is receive-only, and is checked from its start to its end.
+            // A replayed recording is receive-only, and is checked from its start to its end.
             let live = master.bus().is_live();
             let nodes = match &self.nodes {
                 Nodes::All if !live => NodeId::all().collect(),
@@ -139,7 +139,7 @@ impl Check {
                 expressions: self.expressions.clone(),
                 recording: (duration.is_some() || !live).then_some((mode, duration)),
             };
-            // Without --poll the nodes are only used until the recording starts.
+            // Without --poll, the nodes are only used until the recording starts.
             let claims = self.poll.is_none().then(|| std::mem::take(claims));
             let mut view = View { progress, console, started: None, claims };
             let report = check(master, &options, &mut view);

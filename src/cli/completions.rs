@@ -16,13 +16,13 @@ pub(crate) struct Completions {
 }
 
 impl Completions {
-    /// Nothing: other cangauges may use every node.
+    /// No claim: other cangauges may use all nodes.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nothing
     }
 
     pub(super) fn run(&self, _: &Global) -> anyhow::Result<()> {
-        // Into memory first: the generator panics on a closed pipe.
+        // Generated in memory first, because the generator panics on a closed pipe.
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "cangauge", &mut script);
         open_stdout()?.write_all(&script).map_err(stdout)

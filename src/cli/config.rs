@@ -28,7 +28,7 @@ use std::path::Path;
 ///
 /// The file is TOML with the sections [device], [address], [node], [signal.NAME], [tpdo.N], [object] and [calibration].
 /// Values have units: "100ms", "3.2 bar". The whole file is checked before the first write. Only settings that differ
-/// are written, and all of them are read back. A DCF (FILE.dcf) is accepted for diff and apply, too.
+/// are written, and all settings are read back. diff and apply also accept a DCF (FILE.dcf).
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim config dump 1 > mh4.toml\n  cangauge -b sim config dump 127 --changed\n  cangauge config diff 1 mh4.toml\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1-16 mh4.toml --store"
@@ -74,7 +74,7 @@ impl Config {
         }
     }
 
-    /// Whether the command only reads: a description of another device is then a warning.
+    /// Whether the command only reads. A description of another device is then only a warning.
     pub(super) fn only_reads(&self) -> bool {
         !matches!(self.action, Action::Apply(_))
     }
@@ -118,7 +118,7 @@ fn file(name: &str, global: &Global) -> anyhow::Result<tasks::config::File> {
     Ok(tasks::config::File::Dcf(Box::new(dcf)))
 }
 
-/// Reads a file with settings that is no DCF.
+/// Reads a file with settings in TOML.
 fn document(file: &str) -> anyhow::Result<Document> {
     let mut text = String::new();
     File::open(file)
@@ -143,14 +143,14 @@ fn mistakes(file: &str, mistakes: Vec<Mistake>) -> anyhow::Error {
     }
 }
 
-/// The device that a file is for, as its description has it. `None` if the file names none, or an unknown one.
+/// The device of a file, from its description. `None` if the file contains no device, or an unknown one.
 fn described(document: &Document) -> Option<Node> {
     let Item::Text(kind) = &document.get("device.kind")?.value else { return None };
     let model = catalog::by_name(kind)?;
     (!model.description.signals.is_empty()).then(|| offline(NodeId::MIN, &model))
 }
 
-/// The failures of several nodes, each with its own.
+/// The failures of several nodes, one list for each node.
 type Failures = Vec<Vec<Failure>>;
 
 /// Splits the positional arguments: the file is the last one.

@@ -1,4 +1,4 @@
-//! The descriptions and EDS files that the user names, and whether they are for the devices on the bus.
+//! Reads the descriptions and EDS files named by the user, and checks that they are for the devices on the bus.
 
 use super::Global;
 use super::exit::{FileError, IntoFailure};
@@ -19,13 +19,13 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The longest file that is read. It keeps `--eds /dev/zero` from filling the memory.
+/// The longest file that is read, so that `--eds /dev/zero` does not fill the memory.
 const MAX_FILE: u64 = 16 << 20;
 
 /// A description or EDS that the user named.
 #[derive(Clone, Debug)]
 pub(crate) struct Named {
-    /// The node that it is for; `None` for every node that it fits.
+    /// The node of the description; `None` for every matching node.
     node: Option<NodeId>,
     is_eds: bool,
     model: Arc<Model>,
@@ -45,11 +45,11 @@ impl Named {
     }
 }
 
-/// A file and a node whose device it is not for.
+/// A file and a node with a different device.
 type Misfits = BTreeSet<(usize, NodeId)>;
 
-/// The descriptions that the user named, for `nodes`. If it is one node, the device is compared with the files when the
-/// bus is opened: see [`check_pending`].
+/// The descriptions named by the user, for
+/// `nodes`. For a single node, the device is compared with the files when the bus is opened: see [`check_pending`].
 pub(super) fn overrides(global: &Global, nodes: &[NodeId]) -> anyhow::Result<Overrides> {
     let named = named(global)?;
     let overrides = combine(&named, nodes, &Misfits::new());
@@ -59,10 +59,10 @@ pub(super) fn overrides(global: &Global, nodes: &[NodeId]) -> anyhow::Result<Ove
     Ok(overrides)
 }
 
-/// The descriptions that the user named, for those of the `nodes` that they fit.
+/// The descriptions named by the user, for the matching `nodes`.
 ///
 /// # Errors
-/// A file is not for the device of its node. A file without a node fits none of the nodes.
+/// A file is not for the device of its node. A file without a node does not match any node.
 pub(super) fn overrides_on(master: &mut Master<'_>, global: &Global, nodes: &[NodeId]) -> anyhow::Result<Overrides> {
     let named = named(global)?;
     let misfits = misfits(master, global, &named, nodes)?;
@@ -129,7 +129,7 @@ fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[N
             continue;
         }
         let message = mismatch(named.file(), **node, device, *vendor, *product);
-        // No description is for a device of this vendor: the user names the most similar one.
+        // No description is for a device of this vendor, so the user names the most similar description.
         let is_nearest = named.is_built_in()
             && !vendor.is_some_and(catalog::has_vendor)
             && named.model.has_standard_values()
@@ -165,7 +165,7 @@ fn mismatch(file: &str, node: NodeId, device: &MadeFor, vendor: Option<u32>, pro
     )
 }
 
-/// Reads the files that the options name.
+/// Reads the files given by the options.
 fn named(global: &Global) -> anyhow::Result<Vec<Named>> {
     let mut named: Vec<Named> = Vec::new();
     let devices = global.device.iter().map(|given| (given, false));
@@ -218,7 +218,7 @@ pub(super) fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result
 /// The text of a file.
 ///
 /// # Errors
-/// It is not UTF-8, with the line.
+/// The text is not UTF-8; the error contains the line.
 pub(super) fn text(name: &str, bytes: Vec<u8>) -> Result<String, ErrorMessage> {
     String::from_utf8(bytes).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
@@ -238,7 +238,7 @@ fn eds_of(name: &str, bytes: &[u8], global: &Global) -> Result<eds::Eds, ErrorMe
     Ok(eds)
 }
 
-/// No description has this name.
+/// The error for an unknown description.
 pub(super) fn unknown(name: &str) -> ErrorMessage {
     let names: Vec<&str> = catalog::all().map(|model| model.description.name.as_str()).collect();
     let hint = format!("built-in devices: {}; or name a file", names.join(", "));
@@ -252,7 +252,7 @@ pub(super) fn read_file(name: &str) -> Result<Vec<u8>, FileError> {
     read.map(|_| bytes).map_err(|source| FileError { what: format!("read {name}"), source })
 }
 
-/// One line for all warnings; with `-v` each one.
+/// Prints one line for all warnings; with `-v`, prints each warning.
 fn print_warnings(file: &str, warnings: &[eds::Warning], global: &Global) {
     let console = global.console();
     match warnings {

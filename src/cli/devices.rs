@@ -30,17 +30,17 @@ pub(crate) struct Devices {
 enum Action {
     /// Print a description as TOML
     Show {
-        /// Its name: mh4
+        /// Name of the description: mh4
         name: String,
     },
-    /// Print a first description of a device, made from the device and its EDS (--eds); comments show what to complete
+    /// Print a first description of a device from the device and its EDS (--eds); comments mark missing parts
     New {
         /// Node-ID: 5, 0x7f
         node: NodeId,
     },
     /// Report each mistake in a description file with its line
     Check {
-        /// A TOML file
+        /// Description file (TOML)
         file: String,
     },
 }

@@ -16,7 +16,7 @@ use clap::Args;
 ///
 /// Looks for nodes and observes their TPDOs for up to 5 s. Then reads the status of the values, the error registers,
 /// and the objects that explain a silence. Nothing is changed. Each finding is followed by the command to type. Exit
-/// code 0: all is well, 1: something was found.
+/// code 0: no problem, 1: a problem was found.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge doctor 5\n  cangauge doctor --passive\n  cangauge doctor all --format json"

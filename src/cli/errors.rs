@@ -7,7 +7,7 @@ use crate::canopen::id::NodeId;
 use crate::tasks::settings::errors::{ErrorReport, clear, read};
 use clap::Args;
 
-/// Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history
+/// Show the errors of a device, register (1001h) and history (1003h), or clear the history
 ///
 /// The meaning of an error code comes from the description of the device, otherwise from its class in CiA 301.
 #[derive(Debug, Args)]
@@ -21,7 +21,7 @@ pub(crate) struct Errors {
 }
 
 impl Errors {
-    /// The node, for this command alone.
+    /// The node that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nodes(vec![self.node])
     }

@@ -1,4 +1,4 @@
-//! Exit codes. This is the only place that turns errors into an exit code.
+//! Exit codes. This is the only place that converts errors to an exit code.
 
 use super::Cli;
 use crate::bus::BusError;
@@ -21,7 +21,7 @@ use std::num::{IntErrorKind, ParseIntError};
 pub(super) struct Several {
     /// Decides the exit code.
     pub(super) kind: Kind,
-    /// In the order in which they are printed.
+    /// The failures in the order of printing.
     pub(super) failures: Vec<Failure>,
 }
 
@@ -37,10 +37,10 @@ pub(super) fn several(asked: usize, failures: Vec<Failure>) -> Result<(), Severa
     }
 }
 
-/// The same if a node can have several failures, such as the mistakes of a file.
+/// Like [`several`], if a node can have several failures, such as the mistakes of a file.
 ///
 /// # Errors
-/// The failures; the first one of each node counts.
+/// The failures; the first one of each node decides the exit code.
 pub(super) fn several_each(asked: usize, failures: Vec<Vec<Failure>>) -> Result<(), Several> {
     let kinds: Vec<Kind> = failures.iter().filter_map(|of_node| of_node.first().map(Failure::kind)).collect();
     match combined(asked, &kinds) {
@@ -49,10 +49,10 @@ pub(super) fn several_each(asked: usize, failures: Vec<Vec<Failure>>) -> Result<
     }
 }
 
-/// The kind that decides the exit code if `kinds` are the failures of `asked` nodes. `None` without a failure.
+/// The kind that decides the exit code. `kinds` are the failures of `asked` nodes. `None` without a failure.
 ///
-/// A bus failure and Ctrl-C end the command at once, so they decide alone. Otherwise: `partial` if some nodes
-/// succeeded, the common kind if all failed alike, else `unexpected`.
+/// A bus failure and Ctrl-C end the command at once, so they decide alone. Otherwise:
+/// `partial` if some nodes succeeded, the common kind if all failures have the same kind, else `unexpected`.
 fn combined(asked: usize, kinds: &[Kind]) -> Option<Kind> {
     let first = *kinds.first()?;
     if let Some(&end) = kinds.iter().find(|kind| matches!(kind, Kind::Interrupted | Kind::Bus)) {
@@ -135,7 +135,7 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The message of the value's own parser, with the value if the parser does not name it.
+/// The message of the parser of the value, with the value added if it is missing.
 fn wrong_value(error: &clap::Error) -> Option<String> {
     let source = std::error::Error::source(error)?;
     let inner = match source.downcast_ref::<ParseIntError>().map(ParseIntError::kind) {
@@ -148,7 +148,7 @@ fn wrong_value(error: &clap::Error) -> Option<String> {
     Some(if named { inner } else { format!("\"{value}\" for {argument}: {inner}") })
 }
 
-/// Whether the errors are to be JSON. Parsing has failed, so this function searches the words for the option.
+/// Whether to print errors as JSON. Parsing has failed, so the option is searched in the words.
 fn wants_json(words: &[String]) -> bool {
     let apart = words.windows(2).any(|pair| matches!(pair[0].as_str(), "-f" | "--format") && pair[1] == "json");
     apart || words.iter().any(|word| word == "-fjson" || word == "--format=json")
@@ -193,7 +193,7 @@ fn print(console: &Console, error: &anyhow::Error) -> u8 {
     decides.or(messages.first().map(|message| message.kind)).map_or(0, code)
 }
 
-/// The messages to print: none if only the output pipe was closed.
+/// The messages to print; none if only the output pipe was closed.
 fn messages(error: &anyhow::Error) -> Vec<ErrorMessage> {
     if error.is::<ClosedPipe>() {
         return Vec::new();
@@ -218,16 +218,16 @@ fn message(error: &anyhow::Error) -> ErrorMessage {
     }
 }
 
-/// stdout.
+/// Opens stdout.
 ///
 /// # Errors
-/// It was closed when the program started.
+/// stdout was closed when the program started.
 pub(super) fn open_stdout() -> anyhow::Result<io::Stdout> {
     crate::bus::stdout::stdout().map_err(stdout)
 }
 
-/// The message of an error if there is no bus that can be used: `doctor` reports it as a finding. Another program that uses
-/// the node is not one.
+/// The message of an error if no bus can be used, which `doctor` reports as a finding. `None` if another program uses
+/// the node.
 pub(super) fn bus_error(error: &anyhow::Error, has_interface: bool) -> Option<ErrorMessage> {
     let message = message(error);
     let cause = error.downcast_ref::<Failure>().map(|failure| &failure.cause);
@@ -245,7 +245,7 @@ pub(super) fn stdout(error: io::Error) -> anyhow::Error {
     }
 }
 
-/// Turns errors of the layers below into a [`Failure`].
+/// Converts errors of the layers below to a [`Failure`].
 pub(super) trait IntoFailure<T> {
     /// The same result with its error as a [`Failure`].
     fn or_fail(self) -> Result<T, Failure>;

@@ -18,10 +18,10 @@ pub(crate) struct Export {
 #[derive(Debug, Subcommand)]
 #[command(defer = true)]
 enum ExportFormat {
-    /// Print a DBC of the TPDOs as they are mapped now
+    /// Print a DBC file with the present mapping of the TPDOs
     ///
-    /// Signals have the names, units and decimal digits that the devices report. Print it again after a change of the
-    /// mapping or of a unit.
+    /// Signals have the names, units and decimal digits that the devices report. After a change of the mapping or of a
+    /// unit, print the file again.
     #[command(after_help = "Examples:\n  cangauge -b sim export dbc all > bench.dbc")]
     Dbc(DbcArgs),
 }

@@ -1,4 +1,4 @@
-//! Files that a command writes. They are opened before the bus, so that a wrong name has no effect on it.
+//! Files that a command writes. They are opened before the bus, so that a wrong name has no effect on the bus.
 
 use super::exit::{FileError, open_stdout};
 use crate::bus::file::{Locked, is_same, lock, wait_for_reader};
@@ -16,9 +16,9 @@ use std::time::Duration;
 pub(super) enum Existing {
     /// An existing file is an error.
     Refuse,
-    /// Its content is replaced.
+    /// The content is replaced.
     Overwrite,
-    /// It is continued after its last whole line.
+    /// Rows are appended after the last whole line.
     Continue,
 }
 
@@ -30,21 +30,21 @@ pub(super) struct OutFile {
     file: File,
     is_new: bool,
     existing: Existing,
-    /// How many bytes of the existing file are kept.
+    /// The number of bytes of the existing file that are kept.
     keep: u64,
-    /// One of our own standard streams: nothing in it is removed.
+    /// Whether the file is a standard stream of this program, whose content is never removed.
     is_own_stream: bool,
-    /// How long opening it waited for the reader of a FIFO.
+    /// The time that opening waited for the reader of a FIFO.
     pub(super) waited: Duration,
 }
 
 impl OutFile {
-    /// Opens a file. With `force` an existing one is overwritten.
+    /// Opens a file. With `force`, an existing file is overwritten.
     pub(super) fn create(path: &Path, force: bool) -> anyhow::Result<OutFile> {
         OutFile::open(path, if force { Existing::Overwrite } else { Existing::Refuse }, None)
     }
 
-    /// Opens a file and locks it. It waits for the reader of a FIFO, not longer than `limit`.
+    /// Opens a file and locks it. Waits for the reader of a FIFO, at most for `limit`.
     pub(super) fn open(path: &Path, existing: Existing, limit: Option<Duration>) -> anyhow::Result<OutFile> {
         let mut options = OpenOptions::new();
         options.append(true);
@@ -61,7 +61,7 @@ impl OutFile {
             if ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name)) {
                 open_stdout()?;
             }
-            // The shell opened it, and it may already contain other data.
+            // The shell opened this stream, which may already contain other data.
             let file = options.open(path).map_err(|source| file_error("open", path, source))?;
             return Ok(out(file, false, true, Duration::ZERO));
         }
@@ -70,7 +70,7 @@ impl OutFile {
         let is_dangling_link = metadata.is_none() && path.symlink_metadata().is_ok();
         let is_new = metadata.is_none() && !is_dangling_link;
         let is_regular = metadata.is_some_and(|metadata| metadata.is_file());
-        // A FIFO and a device are used as they are.
+        // A FIFO or a device is used as it is.
         if is_new || existing == Existing::Refuse && is_regular {
             options.create_new(true);
         }
@@ -98,7 +98,7 @@ impl OutFile {
         !self.is_own_stream && self.file.metadata().is_ok_and(|metadata| metadata.is_file())
     }
 
-    /// The lines of a file to be continued; `None` if there are none.
+    /// The lines of an existing file; `None` if it has no lines.
     pub(super) fn existing_lines(&mut self) -> anyhow::Result<Option<ExistingLines>> {
         if self.existing != Existing::Continue || self.is_new || !self.is_regular() {
             return Ok(None);
@@ -121,7 +121,7 @@ impl OutFile {
     /// Writes the whole content, after the bytes that are kept.
     pub(super) fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         let emptied = if self.is_regular() { self.file.set_len(self.keep) } else { Ok(()) };
-        // An object of 0 bytes is content: the file stays.
+        // An object of 0 bytes is also content, so the file is kept.
         self.is_new = false;
         emptied.and_then(|()| self.file.write_all(bytes)).map_err(|source| self.error(source))
     }
@@ -142,22 +142,22 @@ impl Drop for OutFile {
     }
 }
 
-/// A file for a report. It is written under a temporary name and then renamed, so that a reader never finds half of it.
-/// An existing report is replaced.
+/// A file for a report. It is written with a temporary name and then renamed, so that a reader never finds an
+/// incomplete file. An existing report is replaced.
 #[derive(Debug)]
 pub(super) struct ReportFile {
     path: PathBuf,
     file: File,
-    /// The name until the file is complete; `None` for a FIFO, a device and our own standard streams.
+    /// The name until the file is complete; `None` for a FIFO, a device and the standard streams of this program.
     temporary: Option<PathBuf>,
-    /// The report that will be replaced. Its lock keeps other programs from writing it meanwhile.
+    /// The report that will be replaced. Its lock prevents writes by other programs.
     _replaced: Option<File>,
     /// The whole lines of the existing report, if it is continued.
     before: Vec<u8>,
 }
 
 impl ReportFile {
-    /// Opens the file under its temporary name. With `append` the new report follows the existing one.
+    /// Opens the file with its temporary name. With `append`, the new report follows the existing one.
     pub(super) fn create(path: &Path, append: bool) -> anyhow::Result<ReportFile> {
         let is_regular = path.metadata().map_or(true, |metadata| metadata.is_file());
         let mut options = OpenOptions::new();
@@ -215,13 +215,13 @@ impl ReportFile {
 impl Drop for ReportFile {
     fn drop(&mut self) {
         if let Some(temporary) = &self.temporary {
-            // A file that cannot be removed stays under its temporary name.
+            // A file that cannot be removed keeps its temporary name.
             let _ = fs::remove_file(temporary);
         }
     }
 }
 
-/// Locks a file that is written until it is closed.
+/// Locks an output file until it is closed.
 pub(super) fn lock_output(file: &File, path: &Path) -> Result<(), ErrorMessage> {
     lock(file).map_err(|Locked { process, is_own }| {
         let name = path.display();
@@ -254,7 +254,7 @@ fn file_error(verb: &str, path: &Path, source: io::Error) -> anyhow::Error {
     FileError { what: format!("{verb} {}", path.display()), source }.into()
 }
 
-/// Whether a path is one of our own standard streams.
+/// Whether a path is a standard stream of this program.
 fn is_own_stream(path: &Path) -> bool {
     let folders = ["/dev/fd", "/proc/self/fd"];
     path == Path::new("/dev/stdout")

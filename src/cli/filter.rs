@@ -10,8 +10,8 @@ use clap::{Args, ValueEnum};
 
 /// Show or set the filter of a signal: type (61A0h) and constant (61A1h)
 ///
-/// Filter types are named as in the manual of the device: 0 does not mean "no filter" on every device. After a change
-/// the filter is read back. A damping cannot be read back; the filter constant shows its effect.
+/// Filter types have the meaning in the manual of the device: 0 does not mean "no filter" on every device. After a
+/// change, the filter is read back. A damping cannot be read back; the filter constant shows its effect.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim filter 1\n  cangauge -b sim filter 1 pressure --type moving --constant 8\n  cangauge -b sim filter 1 --type moving --damping 100ms"
@@ -25,10 +25,10 @@ pub(crate) struct Filter {
     /// Filter type
     #[arg(long = "type", value_name = "TYPE")]
     kind: Option<Type>,
-    /// Filter constant: number of values
+    /// Filter constant: number of samples
     #[arg(long, value_name = "N")]
     constant: Option<u16>,
-    /// Time in which the value follows a step; the device calculates the constant
+    /// Settling time after a step; the device calculates the constant from it
     #[arg(long, value_name = "DUR", conflicts_with = "constant")]
     damping: Option<Duration>,
 }
@@ -42,7 +42,7 @@ enum Type {
 }
 
 impl Filter {
-    /// The node, for this command alone.
+    /// The node that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nodes(vec![self.node])
     }

@@ -20,7 +20,7 @@ pub(crate) struct Info {
 }
 
 impl Info {
-    /// The node, for this command alone.
+    /// The node that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nodes(vec![self.node])
     }

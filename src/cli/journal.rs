@@ -1,7 +1,7 @@
 //! The journal of temporary writes: one small file per bus and device in `$XDG_STATE_HOME/cangauge/`.
 //!
-//! The file is written and synced before the write, locked while its program runs, and removed when the write is undone.
-//! A file without a lock was left behind by a program that was killed.
+//! The file is written and synced before the write, locked while its program runs, and removed when the write is
+//! undone. A file without a lock comes from a program that was killed.
 
 use super::args::BusSpec;
 use crate::bus::file::lock;
@@ -25,7 +25,7 @@ pub(super) struct FileJournal {
 }
 
 impl FileJournal {
-    /// The journal of a bus. The devices of a simulated bus end with the program, and a recording is never written to.
+    /// The journal of a bus. Simulated devices and recordings need no journal.
     pub(super) fn of(bus: &BusSpec) -> FileJournal {
         match bus {
             BusSpec::SocketCan(name) => FileJournal::in_folder(folder(), name),
@@ -47,7 +47,7 @@ impl FileJournal {
         Some(self.folder.as_ref()?.join(name))
     }
 
-    /// The writes that killed programs left behind on this bus, for these nodes.
+    /// The writes of killed programs on this bus, for these nodes.
     pub(super) fn left_behind(&mut self, is_ours: &dyn Fn(NodeId) -> bool) -> Vec<TemporaryWrite> {
         let entries = self.folder.as_ref().and_then(|folder| fs::read_dir(folder).ok());
         let paths: Vec<PathBuf> = entries.into_iter().flatten().flatten().map(|entry| entry.path()).collect();
@@ -80,7 +80,7 @@ impl Journal for FileJournal {
 
     fn remove(&mut self, write: &TemporaryWrite) {
         if let Some(path) = self.path(write) {
-            // A file that stays is found by the next run, which sees that the object was changed since.
+            // If the file remains, the next run finds that the object has changed since then.
             let _ = fs::remove_file(&path);
             self.own.remove(&path);
         }
@@ -104,7 +104,7 @@ pub(super) fn write_synced(path: &Path, options: &OpenOptions, text: &[u8]) -> i
     Ok(file)
 }
 
-/// Makes the name of a file survive a power failure.
+/// Syncs a folder, so that the name of a file survives a power failure.
 pub(super) fn sync_folder(path: &Path) {
     if let Ok(folder) = File::open(path.parent().unwrap_or(path)) {
         // Some file systems cannot sync a folder.
@@ -112,7 +112,7 @@ pub(super) fn sync_folder(path: &Path) {
     }
 }
 
-/// The folder for the state of programs (XDG base directories). `None` if the environment names none.
+/// The folder for the state of programs (XDG base directories). `None` if the environment contains none.
 pub(super) fn folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;
@@ -132,7 +132,7 @@ fn text(write: &TemporaryWrite, bus: &str) -> String {
     )
 }
 
-/// Reads a file of this bus. `None` also for a file that was cut off: its write was not sent.
+/// Reads a file of this bus. `None` also for an incomplete file, because its write was not sent.
 fn parse(text: &str, bus: &str) -> Option<TemporaryWrite> {
     let mut lines = text.lines();
     let mut line = |name: &str| lines.next()?.strip_prefix(name)?.strip_prefix(' ').map(str::to_owned);

@@ -10,8 +10,8 @@ use clap::Args;
 
 /// Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)
 ///
-/// Values are in the unit of the signal. They apply to transmission types 254 and 255. If event timer and delta of such a
-/// TPDO are both 0, it may never be sent. A warning names it.
+/// Values are in the unit of the signal. They apply to transmission types 254 and 255. If event timer and delta of such
+/// a TPDO are both 0, it may never be sent. A warning is printed then.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim limits 1 pressure\n  cangauge -b sim limits 1 temperature --delta 0.5\n  cangauge -b sim limits 1 pressure --lower 0.5 --upper 8 --hysteresis 0.1"
@@ -21,13 +21,13 @@ pub(crate) struct Limits {
     node: NodeId,
     /// Signal: pressure, temperature, ch1 to ch16; several: ch1-ch4, ch1,ch3, all
     signal: String,
-    /// Send if the value changes by at least this; 0: off
+    /// Delta: send if the value changes by at least this much; 0: off
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
     delta: Option<f64>,
-    /// Lower limit: send if the value falls below it
+    /// Lower limit: send if the value falls below this limit
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
     lower: Option<f64>,
-    /// Upper limit: send if the value rises above it
+    /// Upper limit: send if the value rises above this limit
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
     upper: Option<f64>,
     /// Hysteresis before a limit triggers again
@@ -41,7 +41,7 @@ fn finite(text: &str) -> Result<f64, String> {
 }
 
 impl Limits {
-    /// The node, for this command alone.
+    /// The node that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nodes(vec![self.node])
     }

@@ -26,8 +26,8 @@ use std::io::{self, IsTerminal};
 
 /// Record measurements as CSV or JSON Lines
 ///
-/// Without --sync, --poll and --request, log records the TPDOs as the nodes send them. It starts all nodes except those that are
-/// known to be operational. At the end it returns them to their previous state if that was known.
+/// Without --sync, --poll and --request, log records the TPDOs as the nodes send them. It starts all nodes that are not
+/// known to be operational. At the end it restores their previous NMT states, if known.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Columns: time (UTC), elapsed_s, node, signal, value, unit, status (ok, invalid, overload-high,
@@ -111,7 +111,7 @@ impl Log {
         finished.result(&files)
     }
 
-    /// Every signal that `--expect` needs must be recorded.
+    /// Checks that every signal for `--expect` is recorded.
     fn check_expectations(&self) -> Result<(), Failure> {
         let wanted: Vec<&Wanted> = self.signals.iter().map(|signal| &signal.0).collect();
         for expression in &self.expect {
@@ -141,7 +141,7 @@ impl Log {
             let waits = master.bus().waits();
             let mut recorder =
                 Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
-            // Without --poll the nodes are free for others as soon as the recording runs.
+            // Without --poll, the nodes are free for other processes as soon as the recording runs.
             recorder.claims = self.poll.is_none().then(|| std::mem::take(claims));
             let mut checker = Checker::new(&self.expect, &options.nodes, true, &mut recorder);
             let report = log(master, &options, &mut checker);
@@ -195,7 +195,7 @@ impl Log {
         })
     }
 
-    /// A recording that is played back (`replay:`) is always passive.
+    /// A replayed recording is always passive.
     fn mode(&self, is_live: bool) -> Mode {
         match (self.sync, self.poll, self.request) {
             (Some(interval), ..) => Mode::Sync(interval.0),

@@ -23,8 +23,8 @@ use std::sync::Arc;
 /// Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)
 ///
 /// TARGET is a node-ID, an identity (VENDOR:PRODUCT:REVISION:SERIAL), "only" or "unconfigured". For a node-ID, the
-/// identity is read first, and the device is addressed by it. "only" is rejected if there is more than one device.
-/// "unconfigured" is a device without a node-ID, found by fastscan.
+/// identity is read first, and the device is then addressed by its identity. "only" is rejected if there is more than
+/// one device. "unconfigured" is a device without a node-ID, found by fastscan.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim lss scan\n  cangauge -b sim:dps@127 lss set-id 127 12\n  cangauge -b sim:mh4@1 lss set-bitrate 1 500k --retime"
@@ -47,7 +47,7 @@ enum Action {
     Activate(Activate),
     /// Store node-ID and bit rate in non-volatile memory
     Store(StoreArgs),
-    /// Check whether devices have an identity in a range. Exit code 3 if none answers
+    /// Check whether devices have an identity in a range. Exit code 3 if no device answers
     Identify(Identify),
 }
 
@@ -102,7 +102,7 @@ impl FromStr for AnyTarget {
 }
 
 impl LssCommand {
-    /// LSS reaches every device, so the command needs the bus alone.
+    /// LSS reaches every device, so no other cangauge may use the bus.
     pub(super) fn claim(&self) -> Claim {
         Claim::Bus
     }
@@ -125,7 +125,7 @@ impl LssCommand {
     }
 }
 
-/// The descriptions that the user named.
+/// The descriptions named by the user.
 struct NamedDescriptions {
     overrides: Overrides,
     given: Option<Arc<Model>>,
@@ -136,7 +136,7 @@ impl NamedDescriptions {
         let all: Vec<NodeId> = NodeId::all().collect();
         let overrides = descriptions::overrides(global, &all)?;
         let named: Vec<NodeId> = global.device.iter().chain(&global.eds).filter_map(|given| given.node).collect();
-        // A description that was named for no node is an override of every node that was not named.
+        // A description without a node is an override for every node without its own description.
         let given = overrides.iter().find(|(node, _)| !named.contains(node)).map(|(_, model)| Arc::clone(model));
         Ok(NamedDescriptions { overrides, given })
     }
@@ -146,7 +146,7 @@ impl NamedDescriptions {
     }
 }
 
-/// Runs a task with a master on the bus and the descriptions that the user named. Its notes are printed.
+/// Runs a task with a master on the bus and the descriptions named by the user. Prints the notes of the task.
 fn with_descriptions<T>(
     global: &Global,
     work: impl FnOnce(&mut Master<'_>, &Descriptions<'_>, &mut dyn FnMut(Note)) -> Result<T, Failure>,

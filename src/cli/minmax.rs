@@ -19,7 +19,7 @@ pub(crate) struct Minmax {
 }
 
 impl Minmax {
-    /// The node, for this command alone.
+    /// The node that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nodes(vec![self.node])
     }

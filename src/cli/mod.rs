@@ -119,8 +119,8 @@ pub struct Global {
     #[arg(long, global = true, value_name = "[NODE=]FILE")]
     pub(crate) eds: Vec<Override>,
 
-    /// The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several
-    /// nodes
+    /// COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for
+    /// one of several nodes
     #[arg(long, global = true, value_name = "[NODE=]TX:RX")]
     pub(crate) sdo: Vec<Channel>,
 
@@ -136,7 +136,7 @@ pub struct Global {
     #[arg(long, global = true, value_name = "DUR")]
     pub(crate) wait: Option<Duration>,
 
-    /// Play a recording (replay:) in real time
+    /// Replay a recording (replay:) in real time
     #[arg(long, global = true)]
     pub(crate) pace: bool,
 
@@ -164,11 +164,11 @@ pub struct Global {
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     pub(crate) color: When,
 
-    /// The nodes that the command keeps other cangauges from using.
+    /// The nodes that no other cangauge may use at the same time.
     #[arg(skip)]
     pub(crate) claim: Claim,
 
-    /// Whether the command only reads: a description of another device is then a warning.
+    /// Whether the command only reads. A description of another device is then only a warning.
     #[arg(skip)]
     pub(crate) only_reads: bool,
 
@@ -180,16 +180,16 @@ pub struct Global {
     #[arg(skip)]
     pub(crate) on_two_devices: OnTwoDevices,
 
-    /// Whether the command shows NMT states: unusual heartbeats are then reported.
+    /// Whether the command shows NMT states. Unusual heartbeats are then reported.
     #[arg(skip)]
     pub(crate) shows_states: bool,
 
-    /// Descriptions that are yet to be compared with the devices of these nodes.
+    /// Descriptions that are not yet compared with the devices of these nodes.
     #[arg(skip)]
     pub(crate) pending: RefCell<Option<(Vec<Named>, Vec<NodeId>)>>,
 }
 
-// No doc comments on the variants: clap would spread each over lines of its own in every help text.
+// The variants have no doc comments, because clap would print each one on its own line.
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum When {
@@ -198,8 +198,8 @@ pub(crate) enum When {
     Never,
 }
 
-/// Registers the commands: variant, type of the arguments, name, aliases. Each type has a `claim` (what the command
-/// keeps other cangauges from) and a `run`. Its doc comment is the help text.
+/// Registers the commands: variant, type of the arguments, name, aliases. Each type has a
+/// `claim` (the nodes that no other cangauge may use) and a `run`. Its doc comment is the help text.
 macro_rules! commands {
     ($($variant:ident($arguments:ty): $name:literal $(| $alias:literal)*;)+) => {
         // The doc comment of the type is the help of the command.
@@ -214,7 +214,7 @@ macro_rules! commands {
         }
 
         impl Command {
-            /// The nodes that the command keeps other cangauges from using.
+            /// The nodes that no other cangauge may use at the same time.
             fn claim(&self) -> Claim {
                 match self {
                     $(Command::$variant(command) => command.claim(),)+
@@ -304,7 +304,7 @@ impl Command {
 }
 
 impl Command {
-    /// Whether it changes something in devices that a later command could see.
+    /// Whether the command changes devices in a way that affects later commands.
     fn changes_devices(&self) -> bool {
         match self {
             Command::Lss(lss) => lss.changes_devices(),
@@ -316,7 +316,7 @@ impl Command {
     }
 }
 
-/// Whether a simulated bus is described by a file, not by a list of devices.
+/// Whether a simulated bus is given by a file, not by a list of devices.
 fn is_bench_file(bench: &Option<String>) -> bool {
     bench.as_ref().is_some_and(|bench| bench.ends_with(".toml"))
 }
@@ -325,7 +325,7 @@ fn is_bench_file(bench: &Option<String>) -> bool {
 type Augment = fn(clap::Command) -> clap::Command;
 
 impl Global {
-    /// The output on stderr, as these options set it.
+    /// The output on stderr with these options.
     pub(crate) fn console(&self) -> Console {
         Console {
             quiet: self.quiet,
@@ -357,7 +357,7 @@ impl Global {
         }
     }
 
-    /// Whether the output is for people.
+    /// Whether the output is text.
     pub(crate) fn prints_text(&self) -> bool {
         self.format.is_text()
     }
@@ -367,7 +367,7 @@ impl Global {
         render(reports, self.format, &mut exit::open_stdout()?.lock()).map_err(exit::stdout)
     }
 
-    /// Prints reports if the format is for programs, else the output of `text`.
+    /// Prints reports as JSON or CSV; for text, the output of `text`.
     pub(crate) fn print_or<R: Report>(
         &self,
         reports: &[R],
@@ -379,12 +379,12 @@ impl Global {
         text(&mut exit::open_stdout()?.lock()).map_err(exit::stdout)
     }
 
-    /// Prints reports if the format is for programs. People get a note on stderr.
+    /// Prints reports as JSON or CSV. For text, the command prints a note on stderr instead.
     pub(crate) fn print_data<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
         self.print_or(reports, |_| Ok(()))
     }
 
-    /// Prints reports if the format is JSON: results of a command that failed.
+    /// Prints reports if the format is JSON. For results of a failed command.
     pub(crate) fn print_json<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
         if self.format.is_json() { self.print(reports) } else { Ok(()) }
     }
@@ -399,7 +399,7 @@ impl Global {
         self.with_claims(|master, _| work(master))
     }
 
-    /// The same for work that can release its claims before it ends.
+    /// Like [`Global::with_master`], for work that can release its claims before it ends.
     pub(crate) fn with_claims<T>(
         &self,
         work: impl FnOnce(&mut Master<'_>, &mut Claims) -> anyhow::Result<T>,
@@ -413,7 +413,7 @@ impl Global {
             .undo_left_behind(&mut master, &spec)
             .and_then(|()| descriptions::check_pending(&mut master, self))
             .and_then(|()| work(&mut master, &mut claims));
-        // The last frames of a command are still sent: an abort, an NMT state to restore.
+        // Sends the last frames of a command: an abort, or a command that restores an NMT state.
         master.settle();
         for (node, answers) in master.second_answers() {
             // If the answers differ, the failure of the command reports it, except in a scan.
@@ -455,7 +455,7 @@ impl Global {
 /// Runs a command line.
 ///
 /// # Errors
-/// Why the command failed; [`exit::report`] turns it into text and an exit code.
+/// The failure of the command; [`exit::report`] converts it to text and an exit code.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
     let failed = |source| FileError { what: "watch for the file size limit".to_owned(), source };
     survive_file_size_limit().map_err(failed)?;
@@ -482,8 +482,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The program with its commands. The global options are described only in the help of the program itself; the other
-/// help texts name them in one line.
+/// The program with its commands. The global options are described only in the help of the program. Other help texts
+/// refer to it in one line.
 pub fn program() -> clap::Command {
     fn with_hidden_globals(command: clap::Command) -> clap::Command {
         let globals = Global::augment_args(clap::Command::new("globals"));

@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 
 /// Send NMT commands and show NMT states
 ///
-/// After a command the state is confirmed by a heartbeat, a boot-up message or node guarding. After "stop", the state
+/// After a command, the state is confirmed by a heartbeat, a boot-up message or node guarding. After "stop", the state
 /// is confirmed if the node no longer answers SDO. Node guarding is not used if it would start life guarding, or if
 /// another master uses it. Unconfirmed states are shown as "none".
 #[derive(Debug, Args)]
@@ -35,7 +35,7 @@ pub(crate) struct Nmt {
 #[derive(Debug, Subcommand)]
 #[command(defer = true)]
 enum Action {
-    /// Set nodes to OPERATIONAL: they send their TPDOs
+    /// Set nodes to OPERATIONAL: nodes send TPDOs
     Start(Targets),
     /// Set nodes to STOPPED: only NMT, heartbeat and LSS work
     Stop(Targets),
@@ -49,7 +49,7 @@ enum Action {
     State(StateArgs),
     /// Follow heartbeats, boot-ups and losses until Ctrl-C
     Watch(WatchArgs),
-    /// Show or set the start after power-on: wait (for the master) or auto (the device starts itself)
+    /// Show or set the start after power-on: wait (for the master) or auto (the device starts by itself)
     Startup(StartupArgs),
 }
 
@@ -57,7 +57,7 @@ enum Action {
 struct Targets {
     /// Nodes: 5, 0x7f, 1-16, 1,5; all is one broadcast
     nodes: Nodes,
-    /// Exit with 3 if nothing confirms the state
+    /// Exit with 3 if the state cannot be confirmed
     #[arg(long, conflicts_with = "no_wait")]
     confirm: bool,
     /// Send the command without confirmation
@@ -69,14 +69,14 @@ struct Targets {
 struct StateArgs {
     /// Nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// If the state is unknown, switch the heartbeat on for a moment (1017h)
+    /// If the state is unknown, switch on the heartbeat (1017h) for a moment
     #[arg(long)]
     probe: bool,
 }
 
 #[derive(Debug, Args)]
 struct WatchArgs {
-    /// Nodes: 5, 0x7f, 1-16, 1,5. The heartbeat interval of named nodes is read (1017h); of others it is measured
+    /// Nodes: 5, 0x7f, 1-16, 1,5. For these nodes, the heartbeat time is read (1017h); for all, it is measured
     #[arg(default_value = "all")]
     nodes: Nodes,
     /// End after this time
@@ -96,7 +96,7 @@ struct StartupArgs {
 enum StartupMode {
     /// The master starts the device
     Wait,
-    /// The device starts itself
+    /// The device starts by itself
     Auto,
 }
 
@@ -110,7 +110,7 @@ impl Nmt {
             | Action::Reset(targets)
             | Action::ResetComm(targets) => targets.nodes.claim(),
             Action::State(args) => args.nodes.claim(),
-            // It asks each node once and then listens, for hours.
+            // The command sends one request to each node, and then only listens.
             Action::Watch(_) => Claim::Nothing,
             Action::Startup(args) => Claim::Nodes(vec![args.node]),
         }
@@ -173,10 +173,10 @@ impl Targets {
     fn failure_of(&self, kind: NmtCommand, report: &StateReport, global: &Global) -> Option<Failure> {
         let wanted = kind.target();
         let cause = match report.state {
-            // A device that starts by itself leaves PRE-OPERATIONAL at once after a reset.
+            // After a reset, a device that starts by itself leaves PRE-OPERATIONAL at once.
             Some(state) if kind.is_reset() || state == wanted => return None,
             Some(state) => NmtFailure::OtherState { state, wanted },
-            // The restart is proven, the state is not.
+            // The restart is proven, but not the state.
             None if kind.is_reset() && report.by == Proof::BootUp => return None,
             None if !report.is_present => NmtFailure::NoSign,
             None if kind.is_reset() => NmtFailure::NoBootUp,

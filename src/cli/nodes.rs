@@ -1,4 +1,4 @@
-//! Commands that work on one node, or on one node after the other.
+//! Runs commands on one node, or on one node after the other.
 
 use super::Global;
 use super::args::Nodes;
@@ -15,14 +15,14 @@ use crate::tasks::{Failure, Kind, Note};
 
 /// The results of all nodes.
 pub(super) struct NodeResults<T> {
-    /// The number of nodes that were named.
+    /// The number of requested nodes.
     count: usize,
-    /// The nodes that succeeded, in the order in which they were named.
+    /// The successful nodes, in the order of the request.
     pub(super) done: Vec<(NodeId, T)>,
     failures: Vec<Failure>,
 }
 
-/// Runs `work` on every node, one after the other. A bus failure or Ctrl-C ends it.
+/// Runs `work` on every node, one after the other. A bus failure or Ctrl-C ends the command.
 pub(super) fn on_each_node<T>(
     global: &Global,
     nodes: &Nodes,
@@ -62,8 +62,8 @@ pub(super) fn on_node<T>(
     })
 }
 
-/// Runs `work` on the channels of one node that `signals` selects, one after the other. Without `signals`, `work` chooses.
-/// `all` means the channels that the setting `applies` to.
+/// Runs `work` on the channels of one node that `signals` selects, one after the other. Without `signals`, `work`
+/// chooses the channel. `all` means the channels for which `applies` is true.
 pub(super) fn on_channels<T>(
     global: &Global,
     node: NodeId,
@@ -78,7 +78,7 @@ pub(super) fn on_channels<T>(
         for name in names {
             match work(master, node, name.as_deref()) {
                 Ok(done) => results.done.push((node.id, done)),
-                // The other channels would fail in the same way, or nothing was requested from them.
+                // After a usage error of the first channel, the other channels would fail in the same way.
                 Err(failure) if failure.kind() == Kind::Usage && results.done.is_empty() => return Err(failure),
                 Err(failure) => {
                     let ends = matches!(failure.kind(), Kind::Interrupted | Kind::Bus | Kind::NoAnswer);
@@ -100,8 +100,8 @@ impl<T> NodeResults<T> {
         (done.into_iter().map(|(_, done)| done).collect(), NodeResults { count, done: Vec::new(), failures })
     }
 
-    /// Turns tolerated failures into notes, if at least one node succeeded. With `all`, a node without the feature is
-    /// no failure.
+    /// Converts tolerated failures to notes, if at least one node succeeded. With `all`, a node without the feature is
+    /// not a failure.
     pub(super) fn tolerate(&mut self, global: &Global, is_tolerated: impl Fn(&Failure) -> bool) {
         if self.done.is_empty() {
             return;

@@ -13,11 +13,11 @@ use crate::output::objects::ObjectFacts;
 use clap::Args;
 use std::sync::Arc;
 
-/// Show what a description or an EDS states about a device's objects
+/// Show the objects of a device from its description or EDS
 ///
-/// Prints name, type, access, range, default and unit of each object. OBJECT or WORD selects objects, and also shows
-/// their meaning, manual page and unclear points. With DEVICE, --device or --eds no bus is used. With NODE, only the
-/// identity of the node is read.
+/// Prints name, type, access, range, default and unit of each object. With OBJECT or WORD, only these objects are
+/// printed, with their meaning, page in the manual and unclear points. With DEVICE, --device or --eds, no bus is used.
+/// With NODE, only the identity of the node is read.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge objects mh4\n  cangauge objects mh4 0x1800 filter\n  cangauge objects --eds FILE.eds temperature\n  cangauge -b sim objects 127 6148h:1 --format json"
@@ -36,7 +36,7 @@ impl Objects {
         self.what.as_deref()?.parse().ok()
     }
 
-    /// The node, whose identity is read.
+    /// The node whose identity is read.
     pub(super) fn claim(&self) -> Claim {
         self.node().map_or(Claim::Nothing, |node| Claim::Nodes(vec![node]))
     }

@@ -1,4 +1,4 @@
-//! Opens the bus, and finds the nodes that the options name.
+//! Opens the bus, and finds the nodes given by the options.
 
 use super::Global;
 use super::args::{BusSpec, Channel, Nodes};
@@ -32,7 +32,7 @@ const WAIT_INTERVAL: Duration = Duration::from_millis(200);
 /// The longest wait for another program that uses the same nodes.
 const CLAIM_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// The bus that the options name, or else the only CAN interface that is up.
+/// The bus given by the options, or else the only CAN interface that is up.
 pub(super) fn spec(global: &Global) -> anyhow::Result<BusSpec> {
     let is_down = |error: &ErrorMessage| interfaces().iter().all(|(_, up)| !up).then(|| error.message.clone());
     match &global.bus {
@@ -41,7 +41,7 @@ pub(super) fn spec(global: &Global) -> anyhow::Result<BusSpec> {
     }
 }
 
-/// Opens the bus that the options name, or else the only CAN interface that is up.
+/// Opens the bus given by the options, or else the only CAN interface that is up.
 pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
     open_as(global, &spec(global)?, false)
 }
@@ -92,7 +92,7 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
     Ok(if channels.is_empty() { bus } else { Box::new(SdoChannels::new(bus, &channels)) })
 }
 
-/// The bus with a trace, if one is asked for. The trace is opened after the bus: without a bus, an existing one keeps its
+/// The bus with a trace, if requested. The trace is opened after the bus: without a bus, an existing trace keeps its
 /// content. Nothing was sent yet.
 pub(super) fn traced(global: &Global, bus: Box<dyn Bus>) -> anyhow::Result<Box<dyn Bus>> {
     let Some(path) = &global.trace else { return Ok(bus) };
@@ -100,7 +100,7 @@ pub(super) fn traced(global: &Global, bus: Box<dyn Bus>) -> anyhow::Result<Box<d
     Ok(Box::new(Traced::new(bus, out, &name)))
 }
 
-/// The SDO channels that the user named.
+/// The SDO channels given by the user.
 fn channels(global: &Global) -> Result<Vec<SdoChannel>, ErrorMessage> {
     let only = match &global.claim {
         Claim::Nodes(nodes) if nodes.len() == 1 => nodes.first().copied(),
@@ -155,7 +155,7 @@ fn recording(global: &Global, spec: &str) -> anyhow::Result<Replay> {
     Ok(if global.pace { bus.in_real_time(Box::new(interrupts()?)) } else { bus })
 }
 
-/// Ctrl-C ends the opening of a bus that waits for its other side.
+/// Converts the error of opening a bus: Ctrl-C ends the wait for the other side.
 fn interrupted(error: BusError) -> Failure {
     match error {
         BusError::Io { source, .. } if source.kind() == io::ErrorKind::Interrupted => Error::Interrupted.into(),
@@ -169,7 +169,7 @@ fn is_missing(error: &BusError) -> Option<String> {
         .then(|| error.to_string())
 }
 
-/// Tries again, as long as `--wait` allows, while `obstacle` names something that may change.
+/// Repeats `attempt` within `--wait`, while `obstacle` returns a reason that may change.
 ///
 /// # Errors
 /// Ctrl-C. The result inside is that of the last attempt.
@@ -259,7 +259,7 @@ fn only_interface() -> Result<BusSpec, ErrorMessage> {
     Err(ErrorMessage::usage(message).hint(hint))
 }
 
-/// The nodes that the user named; for `all`, those that [`all`] finds.
+/// The nodes given by the user; for `all`, those found by [`all`].
 ///
 /// # Errors
 /// `all` finds no node; bus errors and Ctrl-C.

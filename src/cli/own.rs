@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// The longest description that is read.
 const MAX_FILE: u64 = 16 << 20;
 
-/// The folders, the user's own first.
+/// The folders, that of the user first.
 fn folders() -> Vec<PathBuf> {
     let path = |name: &str| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let config = path("XDG_CONFIG_HOME").or_else(|| Some(path("HOME")?.join(".config")));
@@ -21,7 +21,7 @@ fn folders() -> Vec<PathBuf> {
     own.into_iter().chain([PathBuf::from("/usr/share/cangauge/devices")]).collect()
 }
 
-/// Reads the descriptions. Returns why the other files cannot be used.
+/// Reads the descriptions. Returns the mistakes of unusable files.
 ///
 /// # Errors
 /// Two files for the same device.
@@ -30,7 +30,7 @@ pub(super) fn load() -> Result<Vec<String>, ErrorMessage> {
     let mut broken = Vec::new();
     for file in folders().iter().flat_map(|folder| files(folder)) {
         match read(&file) {
-            // A description in the first folder replaces one of the same name in the second.
+            // A description in the first folder replaces one with the same name in the second folder.
             Ok(model) if models.iter().any(|other| other.description.name == model.description.name) => {}
             Ok(model) => models.push(Arc::new(model)),
             Err(reason) => broken.push(reason),

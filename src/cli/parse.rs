@@ -1,7 +1,7 @@
-//! Parses the command line fast.
+//! Parses the command line quickly.
 //!
 //! Scripts start the program once for each value, so its start-up time matters. Building the arguments of all commands
-//! takes most of it. Therefore only the command that the user named is built.
+//! would take most of this time. So only the requested command is built.
 
 use super::{ARGUMENTS, Cli, Global, program};
 use clap::{Args, Command, FromArgMatches};
@@ -10,11 +10,11 @@ use std::ffi::OsString;
 /// Parses a command line. The first word is the name of the program.
 ///
 /// # Errors
-/// Wrong arguments. Requests for help or version are errors too.
+/// Wrong arguments. Requests for help or version are also errors.
 pub fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
     if let Some(mut program) = single_command(&words) {
         let matches = program.try_get_matches_from_mut(&words);
-        // The process ends soon: freeing the memory takes time and gains nothing.
+        // The process ends soon, so freeing the memory would only take time.
         std::mem::forget(program);
         if let Ok(mut matches) = matches {
             let cli = Cli::from_arg_matches_mut(&mut matches);
@@ -22,12 +22,12 @@ pub fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
             return cli;
         }
     }
-    // Errors come from the complete program: it knows similar commands and the usage of all.
+    // Errors come from the complete program, because it knows similar commands and their usage.
     program().try_get_matches_from(words).and_then(|mut matches| Cli::from_arg_matches_mut(&mut matches))
 }
 
-/// The program with one command only: the first word that is the name of a command selects it. If this word is in fact the
-/// value of an option, parsing fails, and the complete program parses the words again.
+/// The program with only one command: the first word that is the name of a command. If this word is the value of an
+/// option, parsing fails, and the complete program parses the words again.
 fn single_command(words: &[OsString]) -> Option<Command> {
     let named = |word: &OsString| ARGUMENTS.iter().find(|(names, _)| names.iter().any(|name| word == name));
     let (names, arguments) = words.iter().skip(1).find_map(named)?;

@@ -142,7 +142,7 @@ fn transmission(text: &str) -> Result<Trigger, String> {
     })
 }
 
-/// A duration as a number of `unit`s that fits 16 bits.
+/// A duration as a number of `unit`s of at most 16 bits.
 fn units(text: &str, unit: std::time::Duration, form: &str) -> Result<u16, String> {
     let wrong = || match text.parse::<f64>() {
         Ok(_) => format!("\"{text}\" has no unit ({text}ms): it must be {form}"),
@@ -173,7 +173,7 @@ fn identifier(text: &str) -> Result<u16, String> {
 }
 
 impl Pdo {
-    /// The nodes, for this command alone.
+    /// The nodes that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         match &self.action {
             Action::Show(args) => Claim::Nodes(vec![args.node]),
@@ -255,7 +255,7 @@ impl WatchArgs {
             let overrides = descriptions::overrides_on(master, global, &nodes)?;
             let mut claims = Some(std::mem::take(claims));
             let mut report = |event: &WatchEvent<'_>| {
-                // The mappings are read; from now on the command only listens.
+                // The mappings are read. From now on, the command only listens.
                 claims.take();
                 match *event {
                     WatchEvent::Restarted(node) => {

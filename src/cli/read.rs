@@ -16,8 +16,8 @@ use clap::Args;
 
 /// Read measured values now, scaled, with unit and status
 ///
-/// One signal of one node prints the bare number, so that P=$(cangauge read 5 pressure) works. Without
-/// SIGNAL every signal of the device is read.
+/// For one signal of one node, only the number is printed: P=$(cangauge read 5 pressure). Without SIGNAL, every signal
+/// of the device is read.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim read 1\n  cangauge -b sim read 127 pressure --in bar\n  cangauge -b sim read 1,127 --format json"
@@ -38,7 +38,7 @@ pub(super) fn parse_unit(text: &str) -> Result<Unit, String> {
 }
 
 impl Read {
-    /// The nodes that it does not share with another cangauge process.
+    /// The nodes that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         self.nodes.claim()
     }
@@ -59,7 +59,7 @@ impl Read {
                 Err(failure) => failures.push(failure),
             }
         }
-        // `all` means the nodes that have the signal. It fails if no node has it.
+        // `all` means the nodes with the signal. The command fails if no node has the signal.
         if self.nodes == Nodes::All && !values.is_empty() {
             let (without, failed): (Vec<_>, Vec<_>) =
                 failures.into_iter().partition(|failure| failure.kind() == Kind::Usage);

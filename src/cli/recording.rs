@@ -1,4 +1,4 @@
-//! Functions that `log` and `check` share.
+//! Common functions of `log` and `check`.
 
 use super::Global;
 use super::args::{BusSpec, Duration};
@@ -35,7 +35,7 @@ fn interval(text: &str, purpose: &str) -> Result<Duration, String> {
     }
 }
 
-/// Refuses `--sync`, `--poll` and `--request` for a recording (`replay:`), which cannot send.
+/// Rejects `--sync`, `--poll` and `--request` for a replayed recording, which cannot send.
 pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Result<(), ErrorMessage> {
     if matches!(global.bus, Some(BusSpec::Replay(_))) && interval.is_some() {
         return Err(ErrorMessage::usage("a recording (replay:) is receive-only: --sync, --poll and --request send"));

@@ -10,7 +10,7 @@ use crate::tasks::scan::{Found, ScanFailure, listen, scan};
 use clap::Args;
 use std::time::Duration;
 
-/// How long `--passive` listens: three heartbeats of a device that sends one a second.
+/// The time that `--passive` listens: three heartbeats at the usual interval of 1 s.
 const LISTEN_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// The wait after the last request.
@@ -18,12 +18,12 @@ pub(super) const SCAN_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// List every node that answers, with its state, identity and recognised device
 ///
-/// Every node is asked for its device type, all in parallel; nodes without an answer are asked once more. The state comes
-/// from the heartbeat; "-" if the node sends none.
+/// The device type of every node is read in parallel; nodes without an answer are asked once more. The state comes from
+/// the heartbeat; "-" if the node sends no heartbeat.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim scan\n  cangauge -b sim scan 1-16 --format json")]
 pub(crate) struct Scan {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5, all
+    /// Nodes: 5, 0x7f, 1-16, 1,5, all
     #[arg(default_value = "1-127")]
     nodes: Nodes,
     /// Send nothing: list the nodes that send something within 3 s (or --timeout)
@@ -46,7 +46,7 @@ impl Scan {
         let (found, took) = global.with_master(|master| {
             let begin = master.now();
             let found = if self.passive {
-                // A recording is read to its end.
+                // A replayed recording is read to its end.
                 let default = if master.bus().is_live() { LISTEN_TIMEOUT } else { Duration::MAX };
                 let duration = global.timeout.map_or(default, |timeout| timeout.0);
                 listen(master, &nodes, duration, &overrides).or_fail()?
@@ -66,7 +66,7 @@ impl Scan {
         Ok(several(found.len(), failures)?)
     }
 
-    /// Prints how many nodes were found, and how to find out unknown states.
+    /// Prints the number of nodes found, and the command for unknown states.
     fn note(&self, found: &[Found], took: Duration, global: &Global) {
         let nodes = if found.len() == 1 { "node" } else { "nodes" };
         global.console().note(&format!("{} {nodes} in {:.2} s", found.len(), took.as_secs_f64()));

@@ -50,7 +50,7 @@ enum Action {
 struct ReadArgs {
     /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// Objects. A single object prints its value, several print lines "OBJECT VALUE"
+    /// Objects. For a single object, only the value is printed; for several objects, lines "OBJECT VALUE"
     #[arg(required = true)]
     objects: Vec<ObjectArg>,
     /// Decode the bytes as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
@@ -83,8 +83,8 @@ struct WriteArgs {
     /// Encode the value as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
     data_type: Option<DataType>,
-    /// Whether the request contains the size. auto follows the description; if the device rejects this form, the other
-    /// one is sent
+    /// Include the size in the request. auto follows the description; if the device rejects this form, the other form
+    /// is sent
     #[arg(long, value_name = "HOW", default_value = "auto")]
     sdo_size: SdoSize,
     /// Read back and compare
@@ -139,14 +139,14 @@ impl From<SdoSize> for Form {
 }
 
 impl Sdo {
-    /// The nodes that it does not share with another cangauge process.
+    /// The nodes that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         match &self.action {
             Action::Read(ReadArgs { node, .. }) | Action::Write(WriteArgs { node, .. }) => Claim::Nodes(vec![*node]),
         }
     }
 
-    /// Whether it is `sdo read`.
+    /// Whether the command is `sdo read`.
     pub(super) fn only_reads(&self) -> bool {
         matches!(self.action, Action::Read(_))
     }
@@ -210,7 +210,7 @@ impl ReadArgs {
             }
             Ok(())
         });
-        // The values that were read before a failure are printed as well.
+        // Values that were read before a failure are also printed.
         let printed = global.print(&values);
         result.and(printed)
     }
@@ -259,7 +259,7 @@ impl WriteArgs {
                 ObjectArg::Name(name) => node.entry_by_name(name),
             };
             if let Some(data_type) = self.data_type.or(entry.as_ref().map(|entry| entry.data_type)) {
-                // A description that is not known yet may explain the word.
+                // A description that is not yet known may explain the word.
                 let may_be_word = |object: ObjectId| {
                     let is_open = !node.is_identified && object.index >= 0x2000;
                     is_open && value.starts_with(char::is_alphabetic)
@@ -295,7 +295,8 @@ impl WriteArgs {
                 });
             }
             let form = self.sdo_size.into();
-            // The first SDO to a node is a read: a transfer that another master did not finish then disturbs no write.
+            // The first SDO to a node is a read, so that an unfinished transfer of another master does not disturb the
+            // write.
             find_form(master, &mut node)?;
             let bar = TransferProgress::new(global.shows_progress());
             let (mut progress, mut watch) = (|moved| bar.show_bytes(moved), |_: &_| {});

@@ -29,7 +29,7 @@ pub(crate) struct Sim {
 }
 
 impl Sim {
-    /// Nothing: other cangauges may use every node.
+    /// No claim: other cangauges may use all nodes.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nothing
     }

@@ -15,7 +15,8 @@ use clap::{Args, ValueEnum};
 ///
 /// The capability of the device is read first. "save" is sent once and never repeated; the time-out is at least 3 s. If
 /// storing everything would reset custom COB-IDs (MH-4), comm and app are stored instead. Settings that the device does
-/// not store are listed. After a restore, reset the device before you store. Otherwise it stores its old settings again.
+/// not store are listed. After a restore, reset the device before you store. Otherwise the device stores its old
+/// settings again.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim store 1\n  cangauge -b sim store 1 --group app --verify\n  cangauge -b sim store 1,127 --format json"
@@ -31,7 +32,7 @@ pub(crate) struct Store {
     verify: bool,
 }
 
-/// Restore factory defaults (1011h); node-ID and bit rate stay
+/// Restore factory defaults (1011h), except node-ID and bit rate
 ///
 /// "load" is sent once and never repeated; the time-out is at least 3 s. The defaults are used after the next reset of
 /// the node; a store before that may keep the old settings.

@@ -7,13 +7,13 @@ use crate::bus::claim::Claim;
 use crate::tasks::autozero::{Limit, Options, ZeroTarget, autozero, undo_tare};
 use clap::Args;
 
-/// Set the net value of a channel to zero (6139h), or undo this
+/// Set the net value of a channel to zero (6139h), or restore it (--undo)
 ///
 /// The net value is the process value minus the tare zero. The command measures, writes the signature once, and measures
 /// again. It prints the tare zero before and after, and on stderr the command to undo it. It never stores.
 ///
-/// A description (--device) or an EDS (--eds) must have the objects: 6139h and the net value (6140h, 7140h ...).
-/// Nothing is changed (exit 1) if a reading is invalid or the readings vary by more than 0.5 % of the measuring range.
+/// The description (--device) or EDS (--eds) must contain 6139h and the net value (6140h, 7140h ...). Nothing is
+/// changed (exit 1) if a reading is invalid or the readings vary by more than 0.5 % of the measuring range.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge --eds scale.eds tare 5\n  cangauge --device scale.toml tare 5 --channel 2 --undo"
@@ -21,16 +21,16 @@ use clap::Args;
 pub(crate) struct Tare {
     /// Nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// Channel [default: the only one with a tare]
+    /// Channel [default: the only channel with a tare]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=199))]
     channel: Option<u8>,
-    /// Set the tare zero to 0: the net value is the process value again
+    /// Set the tare zero to 0, so that the net value is the process value again
     #[arg(long)]
     undo: bool,
 }
 
 impl Tare {
-    /// The nodes, for this command alone.
+    /// The nodes that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         self.nodes.claim()
     }

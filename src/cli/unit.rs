@@ -14,7 +14,7 @@ use clap::Args;
 
 /// Show or set the physical unit of a signal (6131h)
 ///
-/// After a change, the unit is read back. All values that the device converts are read back as well: measuring range,
+/// After a change, the unit is read back. All values that the device converts are also read back: measuring range,
 /// offset, limits, process value. The unit of a single signal is printed without its name.
 #[derive(Debug, Args)]
 #[command(
@@ -30,7 +30,7 @@ pub(crate) struct Unit {
 }
 
 impl Unit {
-    /// The node, for this command alone.
+    /// The node that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nodes(vec![self.node])
     }
@@ -62,7 +62,7 @@ impl Unit {
         end.end()
     }
 
-    /// A single word is a unit if it names one, otherwise a signal.
+    /// A single word is a unit if it is the name of a unit, otherwise a signal.
     fn words(&self) -> Result<(Option<&str>, Option<Code>), String> {
         match self.words.as_slice() {
             [] => Ok((None, None)),

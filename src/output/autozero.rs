@@ -31,7 +31,7 @@ impl Report for ZeroReport<'_> {
 
     fn cells(&self) -> Vec<Cell> {
         let zeroed = self.zeroed;
-        // Two more decimals than the table shows: a mean has any number of them.
+        // Two more decimal digits than in the table, because a mean is more precise.
         let mean = |mean: Option<f64>| mean.map_or(Cell::Null, |mean| Cell::Real(mean, zeroed.decimals + 2));
         let notes = super::notes::notes(&zeroed.notes);
         vec![
@@ -54,15 +54,15 @@ impl Report for ZeroReport<'_> {
     }
 }
 
-/// Half of the last decimal that is shown.
+/// Half of the last decimal digit in the table.
 fn half(zeroed: &Zeroed) -> f64 {
     i32::try_from(zeroed.decimals).map_or(0.0, |decimals| 0.5 * 10f64.powi(-decimals))
 }
 
-/// `1  pressure  0.013 -> 0.000 bar  shift -0.013 bar  offset 0.0 -> -0.013`; only the
-/// first parts if nothing was changed.
+/// `1 pressure 0.013 -> 0.000 bar shift -0.013 bar offset 0.0 -> -0.013`; without shift and offset if nothing was
+/// changed.
 fn words(node: NodeId, zeroed: &Zeroed) -> Vec<String> {
-    // A number that rounds to zero has no sign.
+    // A number that rounds to zero is printed without a sign.
     let number =
         |number: f64| format!("{:.*}", zeroed.decimals, if number.abs() < half(zeroed) { 0.0 } else { number });
     let mean = |mean: Option<f64>| mean.map_or_else(|| "-".to_owned(), number);

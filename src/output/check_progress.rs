@@ -1,4 +1,4 @@
-//! Live view of a check: one line per expression with the latest values.
+//! The live lines of a check: one line per expression, with the latest values.
 
 use super::progress::{REDRAWS_PER_SECOND, bar, style};
 use super::verdict::values;

@@ -1,4 +1,4 @@
-//! Settings of a device: the file that `config dump` writes, and the reports of `config diff` and `config apply`.
+//! The file of `config dump`, and the reports of `config diff` and `config apply`.
 
 use super::report::{Cell, Column, Report};
 use super::table::{self, Align};
@@ -75,7 +75,7 @@ pub fn write_toml(dump: &Dump, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Revision and serial number: they differ between devices of one kind.
+/// Writes revision and serial number as a comment, because they differ between devices of one kind.
 fn identity_comment(dump: &Dump, out: &mut dyn Write) -> io::Result<()> {
     let [revision, serial] = dump.revision_and_serial;
     let revision = revision.map(|revision| format!("revision 0x{revision:X}"));
@@ -84,7 +84,7 @@ fn identity_comment(dump: &Dump, out: &mut dyn Write) -> io::Result<()> {
     if known.is_empty() { Ok(()) } else { writeln!(out, "# {}", known.join(", ")) }
 }
 
-/// The header of a key's table, and its key in this table.
+/// The header of the table of a key, and the key in this table.
 fn split(key: &str) -> (String, String) {
     let parts: Vec<&str> = key.split('.').collect();
     let depth = match parts.as_slice() {

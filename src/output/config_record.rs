@@ -8,15 +8,15 @@ use serde_json::{Map, Value, json};
 /// The record of one run.
 #[derive(Clone, Debug)]
 pub struct ConfigRecord<'a> {
-    /// When it ended.
+    /// When the run ended.
     pub time: Wall,
     /// The bus.
     pub bus: String,
     /// The file with the settings.
     pub file: String,
-    /// The devices that were set.
+    /// The configured devices.
     pub done: Vec<&'a Applied>,
-    /// The messages about those that were not.
+    /// The messages about failed devices.
     pub failed: Vec<String>,
 }
 

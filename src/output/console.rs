@@ -7,7 +7,7 @@ use anstyle::{AnsiColor, Style};
 use indicatif::MultiProgress;
 use std::io::{self, Write};
 
-/// How much is printed, and in which form.
+/// The amount and the form of the output on stderr.
 #[derive(Clone, Debug)]
 pub struct Console {
     /// Errors only.
@@ -18,7 +18,7 @@ pub struct Console {
     pub json: bool,
     /// Whether to use colour.
     pub color: ColorChoice,
-    /// The progress display, which lines must not break.
+    /// The progress display. Lines are printed above it.
     pub progress: Option<MultiProgress>,
 }
 
@@ -49,7 +49,7 @@ impl Console {
         }
     }
 
-    /// Prints a warning: something is wrong, but the command goes on.
+    /// Prints a warning: there is a problem, but the command continues.
     pub fn warn(&self, message: &str) {
         if !self.quiet {
             self.line(AnsiColor::Yellow.on_default(), "warning: ", message);
@@ -70,7 +70,7 @@ impl Console {
         if let Some(place) = &failure.place {
             let (shown, before) = text::around(&place.text, place.before.chars().count());
             let start: String = shown.chars().take(before).collect();
-            // Escaped characters take more room.
+            // Escaped characters need more space.
             let before = text::safe(&start).chars().count();
             self.line(Style::new(), "  ", &shown);
             self.line(AnsiColor::Red.on_default().bold(), &format!("  {}^", " ".repeat(before)), "");

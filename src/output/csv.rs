@@ -1,11 +1,11 @@
 //! Tables as CSV, for every command with `--format csv` except `log`, whose rows are in [`super::rows`].
 //!
-//! A terminal may be on the other end of stdout: text from devices is made safe here, in every cell.
+//! stdout may be a terminal, so text from devices is made safe in every cell.
 
 use super::text::safe;
 use std::io::{self, Write};
 
-/// Writes a header, if there is one, and rows. A cell that is not known is empty.
+/// Writes a header, if there is one, and rows. Unknown cells are empty.
 pub fn write(out: &mut dyn Write, head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     if !head.is_empty() {

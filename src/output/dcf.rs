@@ -1,4 +1,4 @@
-//! The DCF that `config dump --dcf` writes (CiA 306), for other tools.
+//! The DCF of `config dump --dcf` (CiA 306), for other tools.
 
 use super::text::safe;
 use crate::canopen::object::ObjectId;
@@ -60,7 +60,7 @@ pub fn write_dcf(snapshot: &Snapshot, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// A value as CiA 306 writes it: unsigned integers in hexadecimal digits.
+/// A value in the form of CiA 306, with unsigned integers in hexadecimal.
 fn text(data_type: DataType, value: &Scalar) -> String {
     match value {
         Scalar::Integer(number) if matches!(data_type, DataType::Unsigned(_)) => format!("0x{number:X}"),

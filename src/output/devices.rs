@@ -1,4 +1,4 @@
-//! The reports of `devices`: the list of descriptions, one of them as TOML, and mistakes in a file.
+//! The reports of `devices`: the list of descriptions, a description as TOML, and mistakes in a file.
 
 use super::report::{Cell, Column, Report};
 use super::text;
@@ -80,7 +80,7 @@ pub struct Finding {
     pub file: String,
     /// The place and the text.
     pub mistake: DescriptionError,
-    /// Whether the file cannot be used because of it.
+    /// Whether the mistake makes the file unusable.
     pub is_error: bool,
 }
 

@@ -138,7 +138,7 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
     }
 }
 
-/// A TPDO that is due, and was not received.
+/// The text for a TPDO that is due but was not received.
 fn not_sent(number: TpdoNumber, when: &str, running: Running) -> String {
     let state = match running {
         Running::Operational => "the node is operational",
@@ -157,7 +157,7 @@ fn or_not_running(running: Running) -> &'static str {
     }
 }
 
-/// How many nodes a message lists with their reasons.
+/// The number of nodes listed with their reasons in a message.
 const MAX_LISTED: usize = 3;
 
 /// The reasons of the first nodes: `node 5: …; node 6: …`.
@@ -170,14 +170,14 @@ pub fn reasons(nodes: &[(NodeId, Silence)]) -> String {
     reasons.join("; ")
 }
 
-/// A command to type, or one thing to check. `log` is how options of `log` are given: `add`, or the command.
+/// A command to type, or one thing to check. `log` is the text before options of `log`: `add`, or the command.
 pub fn hint(silence: &Silence, node: NodeId, log: &str) -> Option<String> {
     let poll = || Some(format!("read by SDO instead: {log} --poll 100ms"));
     match &silence.cause {
         SilenceCause::InterfaceDown => Some("show the interfaces: cangauge bus list".to_owned()),
         SilenceCause::NotReadAgain | SilenceCause::PollFailed(_) | SilenceCause::SharedCobId(..) => None,
         SilenceCause::NotOperational { state: NmtState::Stopped, .. } => Some(format!("cangauge nmt preop {node}")),
-        // It left OPERATIONAL by itself, and would do so again.
+        // The node left OPERATIONAL by itself, and would leave it again.
         SilenceCause::NotOperational { was_started, .. } if *was_started || silence.emergency.is_some() => {
             Some(format!("cangauge errors {node}"))
         }

@@ -1,4 +1,4 @@
-//! The report of `doctor`: what is wrong, and the command to type.
+//! The report of `doctor`: the problems, and the commands to type.
 
 use super::diagnosis;
 use super::events::remark_text;
@@ -12,7 +12,7 @@ use crate::tasks::doctor::{Finding, FindingCause};
 use crate::tasks::log::Remark;
 use std::io::{self, Write};
 
-/// A finding as it is printed.
+/// A finding as text.
 #[derive(Clone, Debug)]
 pub struct FindingReport {
     node: Option<NodeId>,
@@ -121,7 +121,7 @@ fn words(finding: &Finding, interface: &str) -> Words {
     }
 }
 
-/// The same for findings that concern the bus.
+/// The words for findings about the bus.
 fn bus_words(cause: &FindingCause, interface: &str) -> Words {
     let detect = format!("find the bit rate: cangauge bus detect {interface}");
     match cause {

@@ -33,7 +33,7 @@ pub fn unknown_type(signal: &str) -> String {
     }
 }
 
-/// How the user can state the type of an object.
+/// How to state the type of an object.
 pub fn type_remedy(node: NodeId, signal: &str) -> String {
     let object = signal.split_once('/').map_or(signal, |(object, _)| object);
     if object.starts_with("0x") {

@@ -1,4 +1,4 @@
-//! A first description of a device as TOML, with comments that show what to complete.
+//! A first description of a device as TOML, with comments about the missing parts.
 
 use super::sdo::is_usually_hexadecimal;
 use super::text::safe;
@@ -47,7 +47,7 @@ pub fn toml(draft: &Draft) -> String {
     text
 }
 
-/// A name that can be typed and that is not in use.
+/// A valid name that is not in use.
 fn free(name: &str, fallback: &str, used: &mut BTreeSet<String>) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
     let words: String = name.chars().map(plain).collect();
@@ -109,7 +109,7 @@ fn signal_entry(draft: &Draft, signal: &Signal, names: &mut BTreeSet<String>) ->
 fn object_entry(draft: &Draft, found: &DraftObject, names: &mut BTreeSet<String>) -> String {
     let object = found.object;
     let fallback = object_name(object);
-    // A name of a run belongs to several objects: `at` with a run numbers them.
+    // The name of a run belongs to several objects, so `at` contains the run, which numbers them.
     let (at, name) = match &found.name {
         Some(name) if found.is_numbered && object.sub > 0 => {
             let plain = free(name, &fallback, &mut BTreeSet::new());
@@ -170,7 +170,7 @@ fn is_mapping(object: ObjectId) -> bool {
     (0x1a00..0x1c00).contains(&object.index) && object.sub > 0
 }
 
-/// The lines as comments, with a note for the person who completes them.
+/// The lines as comments, with a note about completing them.
 fn commented(note: &str, lines: &[String]) -> String {
     let lines = lines.iter().flat_map(|line| line.lines().filter(|line| !line.is_empty()));
     let lines: Vec<String> = lines.map(|line| format!("# {line}")).collect();

@@ -1,4 +1,4 @@
-//! `elapsed_s`: the time since the first row, to the microsecond.
+//! `elapsed_s`: the time since the first row in microsecond resolution.
 
 use crate::bus::{Mono, Stamp};
 use std::time::Duration;
@@ -8,8 +8,8 @@ const CLOCK_STEP_US: i128 = 10_000;
 
 /// Measures the time since the first row.
 ///
-/// It uses the wall times in the rows, so that a recording played back gives the same numbers. If the wall clock was
-/// set, the monotonic clock gives the interval.
+/// The time is computed from the wall times in the rows, so that a replayed recording has the same numbers. If the wall
+/// clock was set, the interval comes from the monotonic clock.
 #[derive(Debug, Default)]
 pub(super) struct Elapsed {
     /// The wall time of the first row, shifted by every later clock step.
@@ -41,7 +41,7 @@ impl Elapsed {
         let (last_us, last) = self.last.unwrap_or((self.start_us, at.mono));
         let mono_us = micros(at.mono.since(last)) - micros(last.since(at.mono));
         let wall_us = micros(at.wall.since_epoch()) - last_us;
-        // The event is written with its wall time: both must agree, unless the clock was set.
+        // The event is written with its wall time, so both must agree unless the clock was set.
         let passed = if (wall_us - mono_us).abs() > CLOCK_STEP_US { mono_us } else { wall_us };
         Duration::from_micros(u64::try_from(last_us + passed - self.start_us).unwrap_or(0))
     }
@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn elapsed_is_the_difference_of_the_row_times() {
         let mut elapsed = Elapsed::default();
-        // The rows show 1.000000999 s and 1.000001001 s as 1.000000 and 1.000001.
+        // In the rows, 1.000000999 s and 1.000001001 s are 1.000000 and 1.000001.
         assert_eq!(elapsed.take(at(0, 1_000_000_999)), Duration::ZERO);
         assert_eq!(elapsed.take(at(2, 1_000_001_001)), Duration::from_micros(1));
         assert_eq!(elapsed.take(at(2_000_000, 1_002_000_000)), Duration::from_micros(2000));

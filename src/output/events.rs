@@ -1,4 +1,4 @@
-//! The events of a recording: as text for people, and as CSV.
+//! The events of a recording, as text and as CSV.
 
 mod text;
 
@@ -12,14 +12,14 @@ pub use text::{event_text, heartbeat_text, remark_text, two_senders};
 /// The columns.
 pub const COLUMNS: [&str; 5] = ["time", "elapsed_s", "node", "event", "text"];
 
-/// How an event is shown.
+/// The importance of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
-    /// Something is wrong.
+    /// A problem.
     Warning,
-    /// For information.
+    /// Information.
     Note,
-    /// Shown with `-v` only.
+    /// Shown only with `-v`.
     Detail,
 }
 
@@ -28,7 +28,7 @@ pub enum Weight {
 pub struct EventText {
     /// The word in the column `event`; `None` if it is not written to the file.
     pub event: Option<&'static str>,
-    /// The node it concerns.
+    /// The node of the event.
     pub node: Option<NodeId>,
     /// One line.
     pub text: String,
@@ -37,7 +37,7 @@ pub struct EventText {
 }
 
 impl EventText {
-    /// An event that concerns no single node.
+    /// An event that does not belong to a single node.
     pub fn of_all(event: &'static str, weight: Weight, text: String) -> EventText {
         EventText { event: Some(event), node: None, text, weight }
     }
@@ -60,7 +60,7 @@ pub struct Events {
     writer: LineWriter,
     dialect: Dialect,
     times: Times,
-    /// Until the first event: whether the file already has its header.
+    /// Whether the file already has its header; `None` after the first event.
     header: Option<bool>,
 }
 
@@ -77,7 +77,7 @@ impl Events {
         String::from_utf8_lossy(&head).trim_end().to_owned()
     }
 
-    /// Writes the header: a file without events has one as well.
+    /// Writes the header, also for a file without events.
     ///
     /// # Errors
     /// The file cannot be written.

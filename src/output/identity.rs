@@ -5,7 +5,7 @@ use crate::device::catalog::{self, Model};
 
 /// 1018h:1, as a number.
 pub const VENDOR: Column = Column::new("vendor").data_only();
-/// The name of the vendor, if a description knows it.
+/// The name of the vendor, if a description contains it.
 pub const VENDOR_NAME: Column = Column::new("vendor_name").heading("VENDOR");
 /// 1018h:2.
 pub const PRODUCT: Column = Column::new("product");
@@ -16,12 +16,12 @@ pub const SERIAL: Column = Column::new("serial");
 
 /// The cells of the columns [`VENDOR`], [`VENDOR_NAME`], [`PRODUCT`], [`REVISION`] and [`SERIAL`].
 ///
-/// `identity` holds 1018h:1 to 4; `model` is the description of the device.
+/// `identity` contains 1018h:1 to 4; `model` is the description of the device.
 pub fn cells(identity: [Option<u32>; 4], model: Option<&Model>) -> [Cell; 5] {
     let [vendor, product, revision, serial] = identity;
     let code = |number: Option<u32>| Cell::from(number.map(Cell::Code));
     let name = vendor.and_then(|vendor| vendor_name(vendor, model));
-    // Without a name the table shows the number.
+    // If the name is unknown, the table shows the number.
     let shown = name.clone().unwrap_or_else(|| code(vendor).shown());
     [code(vendor), Cell::from(name).shown_as(shown), code(product), code(revision), serial.into()]
 }

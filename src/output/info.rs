@@ -10,7 +10,7 @@ use std::io::{self, Write};
 /// The width of the page in characters.
 const WIDTH: usize = 100;
 
-/// The largest number of signals with a column each. The settings of more signals are grouped by value.
+/// The largest number of signals that have a column each. With more signals, the settings are grouped by value.
 const COLUMNS: usize = 3;
 
 /// The rows below a heading.
@@ -101,7 +101,7 @@ pub(super) fn monitoring(Monitoring { heartbeat_ms, guarding_ms }: Monitoring) -
     }
 }
 
-/// Where the description comes from: `built-in`, else its files.
+/// The source of the description: `built-in`, or its files.
 pub(super) fn source(info: &Info) -> Option<String> {
     let model = info.node.model.as_ref()?;
     let place = |device: &MadeFor| match catalog::text(&device.file) {
@@ -235,7 +235,7 @@ fn mapped(info: &Info, object: String, bits: u8) -> String {
     name_of(info, &object).map_or_else(|| format!("{object}/{bits}"), |name| format!("{name} {object}/{bits}"))
 }
 
-/// The name of the signal whose value or status an object is.
+/// The name of the signal whose value or status is in an object.
 pub(super) fn name_of(info: &Info, object: &str) -> Option<String> {
     let of_signal = info.node.signals.iter().find_map(|signal| {
         let mut values = info.node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);

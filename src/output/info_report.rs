@@ -1,4 +1,4 @@
-//! The info page for programs: one JSON object; in CSV one row per object.
+//! The info page as one JSON object, or in CSV as one row per object.
 
 use super::identity;
 use super::info::{self, name_of};

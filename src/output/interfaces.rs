@@ -134,7 +134,7 @@ impl Report for BitRateReport {
         ]
     }
 
-    /// The bit rate alone.
+    /// Prints only the bit rate.
     fn text(reports: &[BitRateReport], out: &mut dyn Write) -> io::Result<()> {
         let mut found = reports.iter().filter_map(|report| report.detection.found);
         found.try_for_each(|(bit_rate, _)| writeln!(out, "{bit_rate}"))

@@ -11,8 +11,8 @@ pub(super) fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<
     out.write_all(b"\n")
 }
 
-/// Escapes more characters than JSON requires, because JSON Lines are also shown in terminals. Not only characters below
-/// 20h control a terminal: 9Bh starts a sequence too.
+/// Escapes more characters than JSON requires, because JSON Lines are also shown in terminals. Besides characters below
+/// 20h, 9Bh also starts a control sequence.
 struct Safe;
 
 impl Formatter for Safe {
@@ -30,7 +30,7 @@ impl Formatter for Safe {
     }
 }
 
-/// A number in JSON: decimals keep their digits, a number that is not finite is null.
+/// A number in JSON. Decimals keep their digits; a number that is not finite is null.
 pub(super) struct JsonNumber(pub(super) Option<Number>);
 
 impl Serialize for JsonNumber {
@@ -47,7 +47,7 @@ impl Serialize for JsonNumber {
     }
 }
 
-/// A value of the object dictionary as JSON has it: numbers as numbers, the rest as text.
+/// A value of the object dictionary in JSON: numbers as numbers, all other types as text.
 pub fn value(value: &crate::canopen::value::Value) -> serde_json::Value {
     use crate::canopen::value::Value;
     match value {
@@ -55,7 +55,7 @@ pub fn value(value: &crate::canopen::value::Value) -> serde_json::Value {
         Value::Unsigned(number) => (*number).into(),
         Value::Integer(number) => (*number).into(),
         Value::Real32(number) if number.is_finite() => {
-            // Through its text, so that 1.1 stays 1.1.
+            // Converted through its text, so that 1.1 stays 1.1.
             number.to_string().parse::<f64>().map_or(serde_json::Value::Null, Into::into)
         }
         Value::Real64(number) if number.is_finite() => (*number).into(),

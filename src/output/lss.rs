@@ -73,7 +73,7 @@ impl Report for Inquired {
 /// The answer to `lss identify`.
 #[derive(Clone, Debug)]
 pub struct Identified {
-    /// The range that was asked for.
+    /// The requested range.
     pub range: LssRange,
 }
 
@@ -296,7 +296,7 @@ fn more_unconfigured(last: LssAddress, reason: Option<&Reason>) -> NoteText {
     NoteText::new("more-unconfigured", message)
 }
 
-/// How far a change has come: `node-ID 12 configured, not stored`.
+/// The progress of a change: `node-ID 12 configured, not stored`.
 pub(super) fn progress(progress: &Progress) -> String {
     let word = |what: String, stage: Stage| match stage {
         Stage::NotDone => format!("{what} not configured"),

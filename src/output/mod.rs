@@ -1,4 +1,4 @@
-//! Rows and text for stdout, stderr and files. Uses neither the bus nor the command line.
+//! Rows and text for stdout, stderr and files. This layer does not use the bus or the command line.
 
 pub mod autozero;
 pub mod check_progress;

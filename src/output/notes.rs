@@ -1,6 +1,6 @@
 //! Text for effects, notes and warnings of tasks.
 //!
-//! Each has a code for scripts, which never changes, and a message for people. Some have a command to type.
+//! Each text has a code for scripts, which never changes, and a message. Some have a command to type.
 
 use super::console::Console;
 use super::doubt;
@@ -14,7 +14,7 @@ use crate::tasks::note::{Rule, StateEffect};
 use crate::tasks::{Effect, Fact, Note};
 use serde::Serialize;
 
-/// An effect or a note as text, and as one object in the `effects` or `notes` of a JSON report.
+/// An effect or a note as text, and as an object in the `effects` or `notes` of a JSON report.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct NoteText {
     /// The code for scripts.
@@ -34,14 +34,14 @@ impl NoteText {
         NoteText { code, message: message.into(), command: None, purpose: "" }
     }
 
-    /// The same with a command. `purpose` is a word or clause: `undo`.
+    /// Adds a command. `purpose` is a word or clause: `undo`.
     pub(super) fn command(mut self, purpose: &'static str, command: impl Into<String>) -> NoteText {
         self.command = Some(command.into());
         self.purpose = purpose;
         self
     }
 
-    /// The same as a cell of a report, for a list of notes.
+    /// The text as a cell of a report, for a list of notes.
     pub(super) fn cell(&self) -> Cell {
         Cell::Object(vec![
             ("code", self.code.into()),
@@ -134,7 +134,7 @@ fn rule_text(node: &str, rule: &Rule) -> NoteText {
         .command("switch the other off first", format!("cangauge sdo write {node} {}", zeros.join(" ")))
 }
 
-/// The text for an NMT state that is not the previous one.
+/// The text for an NMT state that differs from the previous one.
 fn state_text(node: &str, state: StateEffect) -> NoteText {
     match state {
         StateEffect::Unknown => NoteText::new(
@@ -163,14 +163,14 @@ pub(super) fn cell(notes: &[Note]) -> Cell {
     Cell::List(notes.iter().map(|note| self::note(note).cell()).collect())
 }
 
-/// Prints a note on stderr: as a warning if the user should act on it.
+/// Prints a note on stderr, as a warning if needed.
 pub fn print(console: &Console, note: &Note) {
     let node = note.node.map_or_else(String::new, |node| format!("node {node}: "));
     let line = format!("{node}{}", self::note(note).line());
     if note.fact.is_warning() { console.warn(&line) } else { console.note(&line) }
 }
 
-/// The text for a temporary write that an earlier run left behind.
+/// The text for a temporary write of an earlier run.
 pub fn undone_text(write: &TemporaryWrite, undone: Undone) -> String {
     let TemporaryWrite { node, object, .. } = write;
     let [before, written] = [&write.before, &write.written].map(|bytes| value_text(bytes));

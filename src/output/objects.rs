@@ -11,14 +11,14 @@ use crate::device::scalar::{NumberRange, Scalar};
 use crate::output::sdo::is_usually_hexadecimal;
 use std::io::{self, Write};
 
-/// The facts about one object that are known without asking the device.
+/// The facts about one object, without access to the device.
 #[derive(Clone, Debug)]
 pub struct ObjectFacts<'a> {
     /// The description or EDS.
     pub model: &'a Model,
     /// The object.
     pub entry: &'a Entry,
-    /// Whether the user asked for this object: people then get every fact, not one line.
+    /// Whether the user selected this object. The text then contains all facts, not one line.
     pub is_detailed: bool,
 }
 
@@ -113,7 +113,7 @@ impl<'a> ObjectFacts<'a> {
         self.described()?.stored.map(|group| group.as_str())
     }
 
-    /// The first and the last of consecutive objects that one line of the table stands for.
+    /// One line of the table for consecutive objects, from the first to the last.
     fn row(first: &ObjectFacts<'_>, last: ObjectId) -> Vec<String> {
         let entry = first.entry;
         let (object, name) = if entry.object == last {
@@ -129,7 +129,7 @@ impl<'a> ObjectFacts<'a> {
         head.into_iter().chain(shown).chain([page]).collect()
     }
 
-    /// Whether the description has one entry for both, so that they share a line of the table.
+    /// Whether the description has one entry for both objects, so that they share a line of the table.
     fn is_alike(&self, other: &ObjectFacts<'_>) -> bool {
         let run = |facts: &ObjectFacts<'_>| facts.described().map(|described| described.at);
         run(self).is_some_and(|at| at.is_run && run(other) == Some(at))

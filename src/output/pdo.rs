@@ -1,4 +1,4 @@
-//! TPDOs: their settings, and the values that they carry.
+//! The reports of TPDOs: their settings and values.
 
 use super::failure::pdo::entry;
 use super::report::{Cell, Column, Report, joined};
@@ -96,7 +96,7 @@ fn entry_text(item: &MappedItem) -> String {
     text
 }
 
-/// A TPDO as it was received.
+/// A received TPDO.
 #[derive(Clone, Debug)]
 pub struct ReceivedTpdo {
     /// When it was received.

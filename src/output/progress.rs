@@ -103,7 +103,7 @@ impl Progress {
     /// unknown.
     pub fn finish(&mut self, interrupted: bool) {
         if interrupted && !self.is_hidden() {
-            // If the terminal is gone, there is nothing to clean up.
+            // If the terminal is closed, there is nothing to clean up.
             let _ = writeln!(io::stderr());
         } else {
             let _ = self.multi.clear();
@@ -112,7 +112,7 @@ impl Progress {
     }
 }
 
-/// The progress of one transfer, shown only if it takes long.
+/// The progress of one transfer, shown only for long transfers.
 #[derive(Debug)]
 pub struct TransferProgress {
     bar: Option<ProgressBar>,
@@ -130,7 +130,7 @@ impl TransferProgress {
         TransferProgress { bar, calls: Cell::new(0) }
     }
 
-    /// Shows the number of bytes moved, and the total if it is known.
+    /// Shows the number of transferred bytes, and the total if known.
     pub fn show_bytes(&self, (done, total): (usize, Option<usize>)) {
         self.calls.set(self.calls.get().saturating_add(1));
         let Some(bar) = self.bar.as_ref().filter(|_| self.calls.get() >= FIRST_SHOWN_CALL) else { return };

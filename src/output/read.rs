@@ -11,11 +11,11 @@ use std::io::{self, Write};
 pub struct ReadValue<'a> {
     source: &'a Source,
     value: Option<Number>,
-    /// The value as it was sent, or converted with the same number of digits; empty if it is invalid.
+    /// The value as sent, or converted with the same number of digits; empty if invalid.
     text: String,
     unit: String,
     status: Option<Status>,
-    /// Whether people get only the number.
+    /// Whether the text contains only the number.
     is_bare: bool,
 }
 
@@ -35,7 +35,7 @@ impl<'a> ReadValue<'a> {
     }
 }
 
-/// The number of significant digits of a value. A converted value has no more.
+/// The number of significant digits of a value. A converted value has the same number.
 fn significant_digits(value: Option<Number>) -> usize {
     match value {
         Some(Number::Decimal { mantissa, .. }) => mantissa.unsigned_abs().to_string().len().max(4),

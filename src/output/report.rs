@@ -1,14 +1,15 @@
 //! Reports: the output of a command on stdout, defined once for text, JSON Lines and CSV.
 //!
-//! A command returns values that implement [`Report`]. Each value is one JSON object. The same columns and cells make
-//! the CSV file and the table for people. Only [`render`] and [`Stream`] know the formats.
+//! A command returns values that implement
+//! [`Report`]. Each value is one JSON object. The CSV file and the table have the same columns and cells. Only [`render`]
+//! and [`Stream`] know the formats.
 //!
 //! Rules for every report:
 //!
-//! - A value that is unknown or does not apply is `null` in JSON, empty in CSV and `-` in a table. It is never left out.
+//! - A value that is unknown or does not apply is `null` in JSON, empty in CSV and `-` in a table. It is never omitted.
 //! - COB-IDs, device types, addresses, unit codes and bit fields are hexadecimal text (`"0x181"`).
 //! - Vendor, product, revision and serial number are numbers. `vendor_name` follows `vendor`.
-//! - A change has the columns `before` and `after`. A measured value belongs to a `signal`.
+//! - A change has the columns `before` and `after`. A measured value has the column `signal`.
 
 mod cell;
 
@@ -24,7 +25,7 @@ use std::marker::PhantomData;
 /// The form of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// For people.
+    /// Text with aligned tables.
     Text,
     /// JSON Lines: one object per line.
     Json,
@@ -35,7 +36,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Its name on the command line.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Format::Text => "text",
@@ -45,17 +46,17 @@ impl Format {
         }
     }
 
-    /// Whether only recordings have it.
+    /// Whether only recordings have this format.
     pub fn is_for_recordings(self) -> bool {
         matches!(self, Format::Recording(_))
     }
 
-    /// Whether it is for people.
+    /// Whether the format is text.
     pub fn is_text(self) -> bool {
         self == Format::Text
     }
 
-    /// Whether it is JSON Lines.
+    /// Whether the format is JSON Lines.
     pub fn is_json(self) -> bool {
         self == Format::Json
     }
@@ -95,7 +96,7 @@ impl Column {
     }
 
     /// A column of nested rows: an array of objects in JSON; one line per nested row in CSV, which repeats the other
-    /// columns; not in the table. The cell is [`Cell::Rows`].
+    /// columns; not in the table. Its cell is [`Cell::Rows`].
     pub const fn nested(name: &'static str, nested: &'static [Column]) -> Column {
         Column { nested, in_table: false, ..Column::new(name) }
     }
@@ -136,7 +137,7 @@ impl Column {
     }
 }
 
-/// Something that a command reports: one JSON object, one row.
+/// A result of a command: one JSON object, one row.
 pub trait Report: Sized {
     /// The fields, in order.
     const COLUMNS: &'static [Column];
@@ -144,7 +145,7 @@ pub trait Report: Sized {
     /// One cell per column.
     fn cells(&self) -> Vec<Cell>;
 
-    /// The text for people. Default: a table with a heading.
+    /// The text form. Default: a table with a heading.
     ///
     /// # Errors
     /// Those of `out`.
@@ -152,8 +153,8 @@ pub trait Report: Sized {
         table(reports, out)
     }
 
-    /// The line for people when reports are printed one by one as they arrive. Default: the cells of the table, two
-    /// blanks apart.
+    /// The text line for a report that is printed as soon as it arrives. Default: the cells of the table, separated by
+    /// two blanks.
     ///
     /// # Errors
     /// Those of `out`.
@@ -164,7 +165,7 @@ pub trait Report: Sized {
     }
 }
 
-/// Prints reports in this format. The bytes are written at once.
+/// Prints reports in this format. All bytes are written together.
 ///
 /// # Errors
 /// Those of `out`.
@@ -181,7 +182,7 @@ pub fn render<R: Report>(reports: &[R], format: Format, out: &mut dyn Write) -> 
     out.flush()
 }
 
-/// Reports that are printed one by one as they arrive.
+/// Prints reports one by one as they arrive.
 #[derive(Debug)]
 pub struct Stream<R, W> {
     format: Format,
@@ -190,7 +191,7 @@ pub struct Stream<R, W> {
 }
 
 impl<R: Report, W: Write> Stream<R, W> {
-    /// Begins the output; CSV gets its header.
+    /// Starts the output. For CSV, writes the header.
     ///
     /// # Errors
     /// Those of `out`.
@@ -260,7 +261,7 @@ fn csv_head<R: Report>() -> Vec<&'static str> {
     R::COLUMNS.iter().filter(|column| column.in_csv).flat_map(of).collect()
 }
 
-/// The CSV rows of a report: one, or one per nested row.
+/// The CSV rows of a report: one row, or one per nested row.
 fn csv_rows<R: Report>(report: &R) -> Vec<Vec<String>> {
     let cells: Vec<(&Column, Cell)> =
         R::COLUMNS.iter().zip(report.cells()).filter(|(column, _)| column.in_csv).collect();

@@ -1,7 +1,7 @@
 //! The rows of a recording: typed rows, file formats, rotation, and the writing of whole lines.
 //!
-//! [`Rows`] turns samples into typed rows, by layout. A sink formats each row and starts the next file when one is
-//! due. A [`LineWriter`] writes. A further format is one file in `format/`, and its lines in `format.rs`.
+//! [`Rows`] converts samples to typed rows, by layout. A sink formats each row and starts the next file when it is due. A [`LineWriter`]
+//! writes the lines. To add a format, add a file in `format/` and its lines in `format.rs`.
 
 mod cells;
 mod format;
@@ -32,17 +32,17 @@ use std::time::Duration;
 pub use target::{FileChange, OutputTarget};
 use wide::Wide;
 
-/// Turns samples into rows, one per value or one per cycle, and writes them.
+/// Converts samples to rows, one per value or one per cycle, and writes them.
 #[derive(Debug)]
 pub struct Rows {
     sink: RowSink,
-    /// `None` in layout `long`.
+    /// The rows of layout `wide`; `None` in layout `long`.
     wide: Option<Wide>,
     column_changes: u64,
 }
 
 impl Rows {
-    /// Rows for `writer`. The header is written with the first row: without a row nothing is written.
+    /// Rows for `writer`. The header is written with the first row, so without rows nothing is written.
     pub fn new(writer: LineWriter, setup: Setup) -> Rows {
         let wide = (setup.layout == Layout::Wide).then(Wide::default);
         Rows { sink: RowSink::new(writer, setup), wide, column_changes: 0 }
@@ -51,14 +51,14 @@ impl Rows {
     /// Sets the signals that will be measured: the columns of layout `wide`.
     ///
     /// # Errors
-    /// The file to be continued has other columns.
+    /// The existing file has other columns.
     pub fn set_sources(&mut self, sources: &[Source]) -> Result<(), HeaderMismatch> {
         let Some(wide) = &mut self.wide else { return Ok(()) };
         wide.set_sources(sources);
         self.sink.check_columns(Columns::Wide(wide.columns()))
     }
 
-    /// A cycle starts.
+    /// Starts a cycle.
     ///
     /// # Errors
     /// A row cannot be written.
@@ -68,7 +68,7 @@ impl Rows {
         self.put_cycles(at, false)
     }
 
-    /// Takes samples that were received together. Polled samples come with the number of their cycle.
+    /// Adds samples that were received together. Polled samples have the number of their cycle.
     ///
     /// # Errors
     /// A row cannot be written.
@@ -97,7 +97,7 @@ impl Rows {
         Ok(())
     }
 
-    /// Adds the column of a signal or unit that is new.
+    /// Adds the column of a new signal or unit.
     fn add_column(&mut self, sample: &Sample, sources: &[Source]) -> io::Result<()> {
         self.put_cycles(sample.at, true)?;
         let Some(wide) = &mut self.wide else { return Ok(()) };
@@ -106,7 +106,7 @@ impl Rows {
         self.sink.change_columns(Columns::Wide(wide.columns()))
     }
 
-    /// Time passes: writes the rows that have waited long enough.
+    /// Writes the rows that have waited long enough.
     ///
     /// # Errors
     /// A row cannot be written.
@@ -141,7 +141,7 @@ impl Rows {
         self.sink.rows()
     }
 
-    /// Rows that came faster than they could be written, or that could not be written.
+    /// Rows that were lost because writing was too slow or failed.
     pub fn lost(&self) -> u64 {
         self.sink.lost()
     }
@@ -151,17 +151,17 @@ impl Rows {
         self.sink.take_changes()
     }
 
-    /// Rows that came faster than they could be written.
+    /// Rows that were lost because writing was too slow.
     pub fn overflowed(&self) -> u64 {
         self.sink.overflowed()
     }
 
-    /// Values that are in no row of layout `wide`: too late, or not the first ones in their cycle.
+    /// Values that are missing in layout `wide`, because they were too late or not the first in their cycle.
     pub fn left_out(&self) -> u64 {
         self.wide.as_ref().map_or(0, |wide| wide.left_out)
     }
 
-    /// How often the columns of layout `wide` have changed.
+    /// The number of changes of the columns in layout `wide`.
     pub fn column_changes(&self) -> u64 {
         self.column_changes
     }

@@ -37,7 +37,7 @@ impl Report for Found {
     }
 }
 
-/// The name for people.
+/// The name in the table.
 fn shown_name(name: &str) -> String {
     if name.is_empty() { "-".to_owned() } else { text::safe(name) }
 }

@@ -7,26 +7,26 @@ use crate::canopen::value::Value;
 use crate::tasks::sdo::ReadValue;
 use std::io::{self, Write};
 
-/// A value of an object, as `sdo read` prints it.
+/// The report of a value of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectValue {
     /// The value.
     pub read: ReadValue,
-    /// The object as the user typed it.
+    /// The object as entered by the user.
     pub typed: String,
-    /// Whether it is the only object that the user asked for: people then get the bare value.
+    /// Whether it is the only requested object. The text is then only the value.
     pub is_single: bool,
-    /// The form in which people see the value.
+    /// The form of the value in the text.
     pub form: ValueForm,
 }
 
-/// The form of a value for people.
+/// The form of a value in the text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ValueForm {
-    /// By its type; COB-IDs, mapping entries and unit codes are hexadecimal numbers, as manuals print them.
+    /// By its type; COB-IDs, mapping entries and unit codes are hexadecimal, as in manuals.
     #[default]
     Usual,
-    /// A hexadecimal number: it can be written back.
+    /// A hexadecimal number, which can be written back.
     Hexadecimal,
     /// The bytes in wire order: `47 00 00 00`.
     Bytes,
@@ -59,11 +59,11 @@ impl ObjectValue {
         text::wire_bytes(&self.read.raw)
     }
 
-    /// The value for people.
+    /// The value as text.
     fn shown(&self) -> String {
         match &self.read.value {
             _ if self.form == ValueForm::Bytes => spaced(&self.read.raw),
-            // Text is no number: its bytes.
+            // Text is shown as bytes, because it is not a number.
             Value::Text(_) if self.form == ValueForm::Hexadecimal => spaced(&self.read.raw),
             _ if self.form == ValueForm::Hexadecimal => {
                 hexadecimal(&self.read.raw).unwrap_or_else(|| spaced(&self.read.raw))
@@ -102,7 +102,7 @@ impl Report for ObjectValue {
         ]
     }
 
-    /// A single value bare, several as `OBJECT VALUE`.
+    /// A single value alone, several values as `OBJECT VALUE`.
     fn text(reports: &[ObjectValue], out: &mut dyn Write) -> io::Result<()> {
         reports.iter().try_for_each(|value| value.line(out))
     }

@@ -1,4 +1,4 @@
-//! The settings of a device.
+//! The reports of settings of a device.
 
 use super::info;
 use super::notes;
@@ -35,7 +35,7 @@ impl Report for UnitOf {
         ]
     }
 
-    /// The unit of a single signal is printed alone.
+    /// For a single signal, only the unit is printed.
     fn text(units: &[UnitOf], out: &mut dyn Write) -> io::Result<()> {
         if let [only] = units {
             return writeln!(out, "{}", only.unit);
@@ -91,7 +91,7 @@ impl Report for UnitChange {
         ]
     }
 
-    /// `pressure  psi -> bar`, and each rescaled value below it.
+    /// `pressure psi -> bar`, followed by each converted value.
     fn text(changes: &[UnitChange], out: &mut dyn Write) -> io::Result<()> {
         let row = |name: &str, before: String, after: String| vec![name.to_owned(), before, "->".to_owned(), after];
         let mut rows = Vec::new();
@@ -206,7 +206,7 @@ impl Report for MinMax {
         vec![self.now.node.into(), signal, min, max, unit.into(), object, before_min, before_max]
     }
 
-    /// After a reset the previous values are shown: the new ones have no meaning yet.
+    /// After a reset, the previous values are shown, because the new ones have no meaning yet.
     fn text(all: &[MinMax], out: &mut dyn Write) -> io::Result<()> {
         let row = |report: &MinMax| {
             let extremes = report.before.as_ref().unwrap_or(&report.now);

@@ -1,4 +1,4 @@
-//! The summary of a recording: lines for people, one JSON object for programs.
+//! The summary of a recording, as text lines or as one JSON object.
 
 use super::events::remark_text;
 use super::report::{Cell, Column, Format, Report, render};
@@ -14,13 +14,13 @@ use std::time::Duration;
 /// The rows that were written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Written {
-    /// Rows of either layout.
+    /// Rows in the layout `long` or `wide`.
     pub rows: u64,
-    /// Rows among them that were lost: they came too fast, or could not be written.
+    /// The lost rows among them, because writing was too slow or failed.
     pub lost: u64,
     /// Events that were lost.
     pub events_lost: u64,
-    /// Values that are in no row of layout `wide`.
+    /// Values that are not in any row of layout `wide`.
     pub left_out: u64,
 }
 
@@ -31,7 +31,7 @@ pub struct Summary<'a> {
     pub report: &'a RecordingReport,
     /// The rows that were written.
     pub written: Written,
-    /// Whether the recording reached its planned end: `--count`, `--duration`, or any end if none is planned.
+    /// Whether the recording reached its planned end (`--count`, `--duration`). Without a planned end, always true.
     pub complete: bool,
 }
 

@@ -1,10 +1,10 @@
-//! Text for people.
+//! Functions for text output.
 
 use crate::bus::Stamp;
 use std::fmt::Write;
 
-/// Makes text from a device safe for a terminal: control characters, invisible characters and characters that change the
-/// writing direction are replaced by escapes such as `\x1B`.
+/// Makes text from a device safe for a terminal: replaces control characters, invisible characters and changes of the
+/// writing direction with escapes such as `\x1B`.
 pub fn safe(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for character in text.chars() {
@@ -22,7 +22,7 @@ pub fn safe(text: &str) -> String {
     safe
 }
 
-/// Whether a terminal does not simply show this character.
+/// Whether this character may control a terminal or is invisible.
 pub(super) fn is_unsafe(character: char) -> bool {
     let hidden =
         matches!(character, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
@@ -32,7 +32,8 @@ pub(super) fn is_unsafe(character: char) -> bool {
 /// The longest line of an error in characters.
 const LONGEST_LINE: usize = 200;
 
-/// A message as one line of at most 200 characters. Of a longer one, the middle is left out: the cause is at the end.
+/// A message as one line of at most 200 characters. The middle of a longer message is omitted, because the cause is at
+/// the end.
 pub fn one_line(text: &str) -> String {
     let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
     let letters: Vec<char> = joined.chars().collect();
@@ -44,7 +45,8 @@ pub fn one_line(text: &str) -> String {
     format!("{} … {}", part(&letters[..half]), part(&letters[letters.len() - half..]))
 }
 
-/// The part of a long input around a place, after `before` characters; and how many characters of it are before the place.
+/// The part of a long input around the place after `before` characters, and the number of its characters before the
+/// place.
 pub fn around(text: &str, before: usize) -> (String, usize) {
     let letters: Vec<char> = text.chars().collect();
     let from = if letters.len() <= LONGEST_LINE { 0 } else { before.saturating_sub(LONGEST_LINE / 2) };

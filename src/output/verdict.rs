@@ -13,7 +13,7 @@ use std::io::{self, Write};
 /// Significant digits of a calculated value.
 const CALCULATED_DIGITS: usize = 7;
 
-/// The longest text of an exact value. Longer ones are rounded.
+/// The longest text of an exact value. Longer values are rounded.
 const MAX_EXACT_LENGTH: usize = 11;
 
 /// The word for an outcome in text output.
@@ -56,7 +56,7 @@ pub fn findings(verdict: &Verdict, failures: &[Failure]) -> String {
     format!("{text} ({})", notes.join(", "))
 }
 
-/// The text of a reason. [`Reason::Failed`] takes the message of the failure.
+/// The text of a reason. For [`Reason::Failed`], it is the message of the failure.
 fn reason_text(reason: &Reason, failures: &[Failure]) -> String {
     match reason {
         Reason::Failed(at) => {
@@ -95,7 +95,7 @@ pub fn values(quantities: &[QuantityValue], values: &[Option<f64>]) -> String {
     quantities.iter().zip(values).map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// A value with the device's digits, or exactly, or rounded to [`CALCULATED_DIGITS`].
+/// A value with the digits of the device, exact, or rounded to [`CALCULATED_DIGITS`].
 fn number(quantity: &QuantityValue, value: f64) -> String {
     match quantity.digits {
         Some(digits) => format!("{value:.*}", usize::from(digits)),

@@ -1,4 +1,4 @@
-//! The interfaces of this computer, as `cangauge bus` lists and sets them.
+//! Lists and sets the interfaces of this computer for `cangauge bus`.
 
 use crate::output::interfaces::Interface;
 use crate::tasks::Failure;
@@ -19,7 +19,7 @@ mod linux {
     /// The interfaces of this computer.
     pub(in super::super) fn list() -> Vec<Interface> {
         let described = |found: crate::bus::socketcan::Interface| {
-            // The interface may have been removed since it was listed.
+            // The interface may have been removed in the meantime.
             let link = link(&found.name).ok();
             let up = link.as_ref().map_or(found.up, |link| link.up);
             describe(found.name, up, found.driver, link.as_ref())

@@ -31,7 +31,8 @@ use std::path::{Path, PathBuf};
 /// Order: sensor type, unit, digits, filter, limits, other objects, guarding and heartbeat, TPDOs, COB-IDs, store;
 /// finally node-ID and bit rate. A second run prints "0 changes". If a write fails, the error lists the written
 /// settings and the missing ones. Run the same command again to continue, or with --rollback to restore the old
-/// settings. They are kept in $XDG_STATE_HOME/cangauge (or ~/.local/state/cangauge) until the change is complete.
+/// settings. The old settings are kept in $XDG_STATE_HOME/cangauge (or ~/.local/state/cangauge) until the change is
+/// complete.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply --table forty.csv mh4.toml --address --store --record forty.html\n  cangauge config apply 1 --rollback"
@@ -70,10 +71,10 @@ pub(super) struct Apply {
     record: Option<PathBuf>,
 }
 
-/// One device to set.
+/// One device to configure.
 struct Job {
     node: NodeId,
-    /// `None`: the journal.
+    /// The settings; `None` for those in the journal.
     file: Option<File>,
     /// The file, for messages.
     label: String,
@@ -82,7 +83,7 @@ struct Job {
 /// The results, and the failures of each device.
 type Results = (Vec<Outcome>, Failures);
 
-/// Compares vendor and product before the values: those of a DCF for another device have no meaning here.
+/// Compares vendor and product before the values, because the values of a DCF for another device have no meaning here.
 fn check_conditions(document: &Document, snapshot: &Snapshot) -> Result<(), Failure> {
     let conditions = document.entries.iter().filter(|entry| entry.key.starts_with("device."));
     match snapshot.check(&Document { entries: conditions.cloned().collect() }) {
@@ -91,7 +92,7 @@ fn check_conditions(document: &Document, snapshot: &Snapshot) -> Result<(), Fail
     }
 }
 
-/// Checks a file against the description of the device that it names. Needs no bus.
+/// Checks a file against the description of its device. Needs no bus.
 fn check_before(document: &Document, file: &str) -> anyhow::Result<()> {
     match described(document) {
         Some(node) => check_offline(document, &node).map_err(|found| mistakes(file, found)),
@@ -146,7 +147,7 @@ impl Apply {
         Ok(several_each(asked, failures)?)
     }
 
-    /// Sets the nodes that the user named.
+    /// Configures the nodes named by the user.
     fn by_nodes(&self, global: &Global) -> anyhow::Result<(usize, (String, Wall), Results)> {
         let Some(nodes) = self.nodes() else { return Err(self.usage().into()) };
         let label = self.words.last().cloned().unwrap_or_default();
@@ -169,7 +170,7 @@ impl Apply {
         })
     }
 
-    /// Sets the devices of a table, which are found by their identity.
+    /// Configures the devices of a table, which are found by their identity.
     fn by_table(&self, global: &Global, table: &Path) -> anyhow::Result<(usize, (String, Wall), Results)> {
         let [file] = self.words.as_slice() else {
             return Err(
@@ -206,7 +207,7 @@ impl Apply {
         })
     }
 
-    /// Works on one device after the other. A bus failure or Ctrl-C ends it.
+    /// Configures one device after the other. A bus failure or Ctrl-C ends the work.
     fn work(&self, global: &Global, master: &mut Master<'_>, jobs: Vec<Job>, overrides: &Overrides) -> Results {
         let (mut done, mut failures) = (Vec::new(), Failures::new());
         for job in &jobs {
@@ -252,7 +253,7 @@ impl Apply {
         }
     }
 
-    /// Works on one device.
+    /// Configures one device.
     fn one(
         &self,
         global: &Global,

@@ -16,8 +16,8 @@ use clap::Args;
 
 /// Compare a device with a file, two devices, or two files; exit 1 if anything differs
 ///
-/// Each device has its own [address] and [calibration]. So they are compared only with --address and --with-calibration.
-/// Between two files they are always compared.
+/// [address] and [calibration] differ between devices, so they are compared only with --address and --with-calibration.
+/// In two files they are always compared.
 #[derive(Debug, Args)]
 pub(super) struct Diff {
     /// Node-ID or file

@@ -1,7 +1,7 @@
-//! The journal: the old settings of a device, until the change is complete.
+//! The journal keeps the old settings of a device until the change is complete.
 //!
-//! One file for each device, named after the bus and the identity. It is written and synced before the first write, kept
-//! if the change fails or the program is killed, and removed after success.
+//! Each device has one file, named after the bus and the identity. The file is written and synced before the first
+//! write, and removed after success. It is kept if the change fails or the program is killed.
 
 use super::apply::text_of;
 use crate::cli::Global;
@@ -44,11 +44,11 @@ impl Journal for FileJournal<'_> {
                 .note("no journal: neither XDG_STATE_HOME nor HOME is set; --rollback is not possible");
             return Ok(());
         };
-        // An earlier change was not completed: the settings before that change are kept.
+        // An earlier change was not completed, so the settings before that change are kept.
         if path.exists() {
             return Ok(());
         }
-        // A program that is killed now leaves no journal, not a part of one.
+        // If the program is killed now, no incomplete journal remains.
         let draft = path.with_extension("draft");
         let written = write_synced(&draft, File::options().write(true).create(true), &text_of(before));
         written.and_then(|_| fs::rename(&draft, path)).map(|()| sync_folder(path)).map_err(|error| {
@@ -59,13 +59,13 @@ impl Journal for FileJournal<'_> {
 
     fn finish(&mut self) {
         if let Some(path) = &self.path {
-            // A remaining file is older than the settings. --rollback reports it, because the values differ.
+            // A remaining file is older than the settings. --rollback then reports it, because the values differ.
             let _ = fs::remove_file(path);
         }
     }
 }
 
-/// The old settings of a device whose change was not completed: the name of the file, and its text.
+/// The old settings of a device after an incomplete change: the name of the file, and its text.
 ///
 /// # Errors
 /// [`ConfigFailure::NoJournal`].

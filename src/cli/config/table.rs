@@ -1,4 +1,5 @@
-//! `config apply --table FILE.csv`: one row for each device, by its identity; the columns fill in `{column}` in the file.
+//! `config apply --table FILE.csv`: one row for each device, by its identity. The columns replace `{column}` in the
+//! file.
 
 use super::{document, mistakes};
 use crate::canopen::id::{NodeId, parse_u32};
@@ -21,7 +22,7 @@ pub(super) struct TableRow {
     pub(super) label: String,
 }
 
-/// Reads a table and the file that it fills in.
+/// Reads a table and its file.
 pub(super) fn read(table: &Path, file: &str, with_address: bool) -> anyhow::Result<Vec<TableRow>> {
     let name = table.display().to_string();
     let io = |source: std::io::Error| FileError { what: format!("read {name}"), source };
@@ -83,7 +84,7 @@ pub(super) fn read(table: &Path, file: &str, with_address: bool) -> anyhow::Resu
     if rows.is_empty() { Err(wrong(1, "the table has no devices".to_owned()).into()) } else { Ok(rows) }
 }
 
-/// Whether a new device of this kind has this node-ID.
+/// Whether this is the factory node-ID of this kind of device.
 fn is_factory_id([vendor, product, _]: [u32; 3], node: NodeId) -> bool {
     catalog::by_identity(vendor, product).is_some_and(|model| model.description.factory.node_id == Some(node))
 }
@@ -123,7 +124,7 @@ fn filled(template: &Document, cell: &dyn Fn(&str) -> Option<String>) -> Result<
             rest = after;
         }
         out.push_str(rest);
-        // A cell that is the whole value may be a number.
+        // If the cell is the whole value, it may be a number.
         let is_whole = text.starts_with('{') && text.find('}') == Some(text.len() - 1);
         entry.value = match (is_whole, out.parse::<i128>(), out.parse::<f64>()) {
             (true, Ok(number), _) => Item::Integer(number),

@@ -27,7 +27,7 @@ pub(super) struct Files {
     /// Overwrite existing files
     #[arg(long, conflicts_with = "append")]
     force: bool,
-    /// Continue existing files with the same columns. A last line that was cut off is removed
+    /// Append to existing files with the same columns. An incomplete last line is removed
     #[arg(long, requires = "output")]
     append: bool,
     /// One row per value, or one per cycle of --sync or --poll
@@ -57,7 +57,7 @@ pub(super) struct Files {
     time: TimeArg,
 }
 
-// The variants have no doc comments: clap would print each on a line of its own.
+// The variants have no doc comments, because clap would print each one on its own line.
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum LayoutArg {
@@ -145,11 +145,11 @@ pub(super) struct OpenFiles {
     pub(super) summary: Option<ReportFile>,
     series: Option<Series>,
     setup: Setup,
-    /// How many bytes of the existing file are kept.
+    /// The number of bytes of the existing file that are kept.
     keep: u64,
     /// The contents of the existing file of events.
     existing_events: Option<ExistingLines>,
-    /// How long opening waited for readers of FIFOs.
+    /// The time that opening waited for readers of FIFOs.
     pub(super) waited: Duration,
 }
 
@@ -159,7 +159,7 @@ impl Files {
         self.layout == LayoutArg::Wide
     }
 
-    /// Refuses options that do not fit together, before anything is opened.
+    /// Rejects contradictory options before anything is opened.
     pub(super) fn check(&self, format: FileFormat, has_cycles: bool) -> Result<(), ErrorMessage> {
         let refuse = |message: &str, hint: &str| Err(ErrorMessage::usage(message).hint(hint));
         if self.is_wide() && !has_cycles {
@@ -179,7 +179,7 @@ impl Files {
         let files = [&self.output, &self.events, &self.summary].into_iter().flatten();
         let files: Vec<&PathBuf> = files.filter(|path| path.as_path() != Path::new("-")).collect();
         for (at, path) in files.iter().enumerate() {
-            // Two links to one file are found by its lock.
+            // Two links to one file are detected by its lock.
             if files[..at].contains(path) {
                 return refuse(
                     &format!("{} is used for two outputs", path.display()),
@@ -211,7 +211,7 @@ impl Files {
         }
     }
 
-    /// Opens all files, before the bus is opened. Waits for readers of FIFOs, not longer than `limit`.
+    /// Opens all files, before the bus is opened. Waits for readers of FIFOs, at most for `limit`.
     pub(super) fn open(
         &self,
         format: FileFormat,
@@ -335,7 +335,7 @@ impl OpenFiles {
         Ok(Rows::new(line_writer(target, self.series.take(), waits)?, self.setup.clone()))
     }
 
-    /// The writer of the events, if they are wanted.
+    /// The writer of the events, if requested.
     pub(super) fn events(&self, waits: bool) -> anyhow::Result<Option<Events>> {
         let Some(file) = &self.events else { return Ok(None) };
         let (dialect, kept) = (self.setup.dialect, self.existing_events.as_ref());
@@ -344,7 +344,7 @@ impl OpenFiles {
         Ok(Some(Events::new(writer, dialect, self.setup.time, kept.is_some())))
     }
 
-    /// The name of the rows' file.
+    /// The name of the file of the rows.
     pub(super) fn rows_name(&self) -> String {
         self.rows.as_ref().map_or_else(|| "stdout".to_owned(), |file| file.path().display().to_string())
     }

@@ -14,7 +14,7 @@ use crate::tasks::log::{LogFailure, RecordingReport};
 use crate::tasks::{Failure, Kind};
 use std::io::{self, Write};
 
-/// How long Ctrl-C waits for a blocked output, in tenths of a second.
+/// The time that Ctrl-C waits for a blocked output, in tenths of a second.
 const FLUSH_TIMEOUT: u32 = 20;
 
 /// How writing ended.
@@ -25,7 +25,7 @@ pub(super) struct Ended {
     pub(super) deleted: Vec<String>,
 }
 
-/// Waits until everything is written, or until the user does not want to wait any longer.
+/// Waits until everything is written, or until the user stops waiting.
 pub(super) fn wait_for_writers(mut recorder: Recorder, interrupted: bool) -> Ended {
     let mut interrupts = Interrupts::new().ok();
     let mut waited = 0;
@@ -47,12 +47,12 @@ pub(super) fn wait_for_writers(mut recorder: Recorder, interrupted: bool) -> End
 }
 
 impl Unwritten {
-    /// Whether the rows' output was closed by its reader.
+    /// Whether the reader closed the output of the rows.
     pub(super) fn is_closed_output(&self) -> bool {
         matches!(self, Unwritten::Rows(error) if error.kind() == io::ErrorKind::BrokenPipe)
     }
 
-    /// The error of the file or stream. If rows were lost, prints how many.
+    /// The error of the file or stream. If rows were lost, prints their number.
     pub(super) fn into_error(self, console: &Console, files: &OpenFiles, lost: u64) -> anyhow::Error {
         let (file, error) = match (self, &files.events) {
             (Unwritten::Events(error), Some(file)) => return file.error(error),
@@ -105,7 +105,8 @@ impl Finished {
         }
     }
 
-    /// Success, or the failures; the first one gives the exit code, and `partial` if only some nodes could not be recorded.
+    /// Success, or the failures. The first failure decides the exit code; `partial` if only some nodes could not be
+    /// recorded.
     pub(super) fn result(&self, files: &OpenFiles) -> anyhow::Result<()> {
         let unmet = all_satisfied(&self.verdicts, &[]).err();
         let (failed, without_data) = match unmet {
@@ -135,7 +136,7 @@ impl Finished {
         }
     }
 
-    /// Rows or events that the output could not take in time.
+    /// The failure if rows or events were lost because the output was too slow.
     fn too_slow(&self, files: &OpenFiles) -> Option<LogFailure> {
         let name = |file: &Option<OutFile>| {
             file.as_ref().map_or_else(|| "stdout".to_owned(), |file| file.path().display().to_string())
@@ -148,7 +149,7 @@ impl Finished {
         }
     }
 
-    /// Nodes that stopped before the end.
+    /// The failure if nodes stopped before the end.
     fn lost_nodes(&self) -> Option<LogFailure> {
         let nodes = self.report.lost.clone();
         let all = self.report.statistics.iter().all(|(source, _)| nodes.contains(&source.node));

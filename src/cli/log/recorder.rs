@@ -15,7 +15,7 @@ use std::io;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// How often lost rows and changed columns are looked for.
+/// The interval of checks for lost rows and changed columns.
 const CHECK_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Rows that could not be written.
@@ -32,7 +32,7 @@ pub(super) struct Recorder {
     pub(super) progress: Progress,
     pub(super) console: Console,
     pub(super) error: Option<Unwritten>,
-    /// The name of the rows' file.
+    /// The name of the file of the rows.
     file: String,
     /// The nodes that no other cangauge may use until the recording runs.
     pub(super) claims: Option<Claims>,
@@ -70,7 +70,7 @@ impl Recorder {
         }
     }
 
-    /// Ends the recording if something could not be written, or if it has enough rows.
+    /// Ends the recording after a failed write, or if it has enough rows.
     fn proceed(&mut self, result: io::Result<()>) -> ControlFlow<()> {
         if let Err(error) = result {
             self.error.get_or_insert(Unwritten::Rows(error));
@@ -112,7 +112,7 @@ impl Recorder {
         changes.iter().map(file_change_text).collect()
     }
 
-    /// Reports changed files and columns, and when rows start and stop being lost.
+    /// Reports changed files and columns, and the start and end of lost rows.
     fn check_rows(&mut self, at: Stamp) {
         if self.checked.is_some_and(|checked| at.mono.since(checked) < CHECK_INTERVAL) {
             return;

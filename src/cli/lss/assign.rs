@@ -13,15 +13,15 @@ use crate::tasks::lss::{Job, RequestedRate, Target, Via, assign, check_rate, che
 use clap::{Args, ValueEnum};
 use std::str::FromStr;
 
-/// Set the node-ID of a device: check that it is free, configure, store, reset, confirm
+/// Set the node-ID of a device: check that the node-ID is free, configure, store, reset, confirm
 ///
-/// The command succeeds if the device sends its boot-up message under the new node-ID and its identity is read there.
-/// COB-IDs that still contain the old node-ID are reported.
+/// The command succeeds if the device sends its boot-up message and reports its identity with the new node-ID. COB-IDs
+/// that still contain the old node-ID are reported.
 #[derive(Debug, Args)]
 pub(super) struct SetId {
     /// Device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured
     target: Target,
-    /// New node-ID. For "unconfigured" also a range (12-14): one for each device
+    /// New node-ID. For "unconfigured" also a range (12-14): one node-ID for each device
     new: Nodes,
     #[command(flatten)]
     options: Options,
@@ -29,7 +29,7 @@ pub(super) struct SetId {
 
 /// Set the bit rate of a device
 ///
-/// It takes effect at the next start of the device, or at once with --retime.
+/// The bit rate takes effect at the next start of the device, or at once with --retime.
 #[derive(Debug, Args)]
 pub(super) struct SetBitrate {
     /// Device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured
@@ -62,11 +62,11 @@ pub(super) struct Set {
 
 #[derive(Debug, Args)]
 struct RateOptions {
-    /// Index of the bit rate in the table of the device; --retime needs RATE as well
+    /// Index of the bit rate in the table of the device; --retime also needs RATE
     #[arg(long, value_name = "N")]
     table_index: Option<u8>,
-    /// Switch the host interface as well; store after the device responds at the new bit rate. Requires that the device
-    /// is the only one on the bus
+    /// Also switch the host interface; store after the device responds at the new bit rate. The device must be the only
+    /// one on the bus
     #[arg(long)]
     retime: bool,
 }
@@ -84,7 +84,7 @@ struct Options {
     force: bool,
 }
 
-// No doc comments on the variants: clap would print each on a line of its own in every help text.
+// The variants have no doc comments, because clap would print each one on its own line.
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum ViaArg {
@@ -132,7 +132,7 @@ impl RateOptions {
     }
 }
 
-/// Node-ID and bit rate to set, and whether the host follows.
+/// Node-ID and bit rate to set, and whether the host changes its bit rate, too.
 #[derive(Clone, Copy, Debug)]
 struct Values {
     id: Option<NodeId>,
@@ -174,7 +174,7 @@ impl Options {
     fn run(&self, global: &Global, target: &Target, all: &[Values]) -> anyhow::Result<()> {
         let named = NamedDescriptions::new(global)?;
         let (descriptions, via) = (named.get(), Via::from(self.via));
-        // The user's own options are enough to reject values before the bus is opened.
+        // With the options of the user, wrong values are rejected before the bus is opened.
         let model = match target {
             Target::Node(node) => descriptions.overrides.get(node),
             _ => descriptions.given,

@@ -92,7 +92,7 @@ fn length_text(node: NodeId, mapped: usize, received: usize, consequence: &str) 
     format!("node {node}: a TPDO has {received} bytes, its mapping {mapped}: {consequence}")
 }
 
-/// A node sends heartbeats of another length than one byte.
+/// The text for heartbeats whose length is not one byte.
 pub fn heartbeat_text(node: NodeId, length: usize) -> String {
     match length {
         0 => format!("node {node}: frames of 0 bytes on its heartbeat COB-ID are ignored"),
@@ -123,12 +123,12 @@ fn buffer_text(buffer: ReceiveBuffer) -> String {
     format!("the receive buffer has {bytes} bytes")
 }
 
-/// The command with which the kernel allows the wanted receive buffer. It doubles the requested size.
+/// The command that allows the requested receive buffer in the kernel. It doubles the requested size.
 fn allow_larger(buffer: ReceiveBuffer) -> String {
     format!("sudo sysctl net.core.rmem_max={}", buffer.wanted / 2)
 }
 
-/// A TPDO comes from two devices.
+/// The text for a TPDO from two devices.
 pub fn two_senders(number: TpdoNumber) -> String {
     format!("{number} arrives twice at a SYNC, with different values: two devices have this node-ID or COB-ID")
 }

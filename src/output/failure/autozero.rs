@@ -88,7 +88,7 @@ fn quantity(quantity: Quantity) -> String {
     format!("{:.*} {unit}", quantity.decimals, quantity.value).trim_end().to_owned()
 }
 
-/// Why the safety checks stopped it.
+/// The reason why a safety check failed.
 fn reason(objection: &Objection) -> String {
     let part = |percent: &Option<f64>, otherwise: &str| {
         percent.map_or_else(|| otherwise.to_owned(), |percent| format!("{percent} % of the range"))
@@ -119,7 +119,7 @@ fn reason(objection: &Objection) -> String {
     }
 }
 
-/// What to do about an objection.
+/// The remedy for a failed safety check.
 fn remedy(target: ZeroTarget, objection: &Objection, node: &str, choice: &str) -> String {
     match objection {
         Objection::Absolute => "apply a vacuum and use --force".to_owned(),

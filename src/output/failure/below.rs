@@ -51,7 +51,7 @@ pub(super) fn bus(error: &BusError) -> Words {
     }
 }
 
-/// How to get a recording that can be replayed.
+/// The hint how to get a usable recording.
 fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
     let converted = Path::new(file).with_extension("candump.log");
     let converted = converted.display();
@@ -165,8 +165,8 @@ fn silence_advice(node: NodeId, waited: Duration, started: bool, missed: MissedA
     })
 }
 
-/// What to do about a node that shows no sign of life; `None`: its node-ID is unknown. `doctor` finds a cause on a dead
-/// bus too, where `scan` fails as well.
+/// The hint for a node without a sign of life; `None`: its node-ID is unknown. `doctor` also finds causes on a dead
+/// bus, where `scan` fails.
 pub(super) fn check_node(node: Option<NodeId>) -> String {
     let node = node.map_or_else(|| "all".to_owned(), |node| node.to_string());
     format!("check its node-ID, power and cable; find the cause: cangauge doctor {node}")

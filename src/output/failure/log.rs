@@ -124,7 +124,7 @@ fn nothing_received(
         _ => "all".to_owned(),
     };
     let words = Words::new(format!("no measurements within {within}: no TPDO received{states}"));
-    // Started already, they wait for something else.
+    // The nodes are already started, so they wait for another trigger.
     if nodes.iter().all(|(_, state)| *state == Some(NmtState::Operational)) {
         return words.hint("--passive cannot ask the nodes for the reason: omit it");
     }

@@ -16,7 +16,7 @@ use crate::tasks::lss::{
 /// The hint if one identity or one node-ID belongs to several devices.
 const CONNECT_ALONE: &str = "connect only this device";
 
-/// The message and the hint for a cause. A device without a known node-ID is named by its identity.
+/// The message and the hint for a cause. A device without a known node-ID is shown by its identity.
 pub(super) fn words(failure: &Failure, cause: &LssFailure) -> Words {
     let mut words = cause_words(failure, cause);
     if let (None, Some(address)) = (failure.node, cause.device.address) {
@@ -83,7 +83,7 @@ fn other_node_id(found: Option<NodeId>) -> Words {
     Words::new(format!("a device with the same identity answers LSS and {found}")).hint(CONNECT_ALONE)
 }
 
-/// Answers under a node-ID cannot be assigned to one device.
+/// The answers from a node-ID cannot be assigned to one device.
 fn duplicate_node_id(sign: DuplicateSign) -> Words {
     let words = duplicate(sign);
     match sign {
@@ -95,7 +95,7 @@ fn duplicate_node_id(sign: DuplicateSign) -> Words {
     }
 }
 
-/// An LSS service failed. A device that is silent may answer in STOPPED.
+/// An LSS service failed. A silent device may answer in STOPPED.
 fn service(device: &DeviceName, error: &LssError) -> Words {
     let words = below::lss(error);
     let is_silent = matches!(error, LssError::NoAnswer { service, .. } if below::is_addressing(*service));
@@ -158,7 +158,7 @@ fn table(cause: &LssCause) -> Words {
     }
 }
 
-/// The device was not seen under its new node-ID.
+/// The device does not respond at its new node-ID.
 fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
     match cause {
         LssCause::NotReset(new, why) => {

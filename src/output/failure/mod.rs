@@ -35,7 +35,7 @@ use std::io::{self, Write};
 pub struct ErrorMessage {
     /// The kind, which decides the exit code.
     pub kind: Kind,
-    /// The node that it concerns.
+    /// The node of the failure.
     pub node: Option<NodeId>,
     /// The object that was read or written.
     pub object: Option<String>,
@@ -45,13 +45,13 @@ pub struct ErrorMessage {
     pub message: String,
     /// A command to type, or one thing to check.
     pub hint: Option<String>,
-    /// The place in the text that the user typed.
+    /// The place in the text entered by the user.
     pub place: Option<Place>,
     /// The changes before the failure, and the state left behind.
     pub effects: Vec<NoteText>,
 }
 
-/// A character in a text that the user typed.
+/// A character in a text entered by the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// The whole text.
@@ -92,7 +92,7 @@ impl ErrorMessage {
         failure.into()
     }
 
-    /// An error that no task reports: wrong arguments, a local file.
+    /// An error outside of the tasks: wrong arguments, a local file.
     pub fn new(kind: Kind, message: impl Into<String>) -> ErrorMessage {
         ErrorMessage {
             kind,
@@ -188,11 +188,11 @@ impl From<&Failure> for ErrorMessage {
         for item in &failure.effects {
             let text = effect(failure.node, item);
             message = format!("{message}; {}", text.message);
-            // A command that undoes an effect or finishes the job is better than the general hint of the cause.
+            // A command that undoes an effect or completes the task is better than the general hint of the cause.
             hint = text.hint().or(hint);
             effects.push(text);
         }
-        // "node 5 is in use by …" names the node itself.
+        // "node 5 is in use by …" already contains the node.
         let is_named = matches!(&failure.cause, Cause::Bus(error) if matches!(**error, BusError::InUse(_)));
         if let Some(node) = failure.node.filter(|_| !is_named) {
             message = format!("node {node}: {message}");

@@ -9,7 +9,7 @@ use crate::tasks::Failure;
 /// The message and the hint for a cause.
 pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
     match cause {
-        // These have causes of their own, see `From<node::Error> for Failure`.
+        // These errors have their own causes, see `From<node::Error> for Failure`.
         Error::Bus(error) => below::bus(error),
         Error::Interrupted => Words::new("interrupted"),
         Error::Sdo(error) | Error::Unknown(error) => below::sdo(error),

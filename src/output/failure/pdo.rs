@@ -111,7 +111,7 @@ fn list(entries: &[MappingEntry]) -> String {
     entries.iter().map(|&item| entry(item)).collect::<Vec<_>>().join(" ")
 }
 
-/// A list of entries; only the first ones of a long list.
+/// A list of entries; of a long list, only the first entries.
 fn list_some(entries: &[MappingEntry]) -> String {
     match entries.get(..MAX_LISTED) {
         Some(first) if entries.len() > MAX_LISTED => {

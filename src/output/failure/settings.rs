@@ -48,7 +48,7 @@ pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> Words {
     }
 }
 
-/// `pressure`, or `it` for the whole device.
+/// The subject of a message: `pressure`, or `it` for the whole device.
 fn of(signal: Option<&String>) -> &str {
     signal.map_or("it", String::as_str)
 }

@@ -17,9 +17,9 @@ pub enum Cell {
     Bool(bool),
     /// A whole number.
     Integer(i128),
-    /// A measured number, exact as the device sent it. `null` if it is not finite.
+    /// A measured number, exactly as sent by the device. `null` if it is not finite.
     Number(Number),
-    /// A computed number with this many decimals. `null` if it is not finite.
+    /// A computed number with this many decimal digits. `null` if it is not finite.
     Real(f64, usize),
     /// A number of an identity: decimal in JSON and CSV, hexadecimal in a table.
     Code(u32),
@@ -27,7 +27,7 @@ pub enum Cell {
     Text(String),
     /// Data that a table shows as other text, for example a duration with its unit.
     Shown(Box<Cell>, String),
-    /// Several values: an array in JSON; in CSV blanks, in a table commas separate them.
+    /// Several values: an array in JSON; separated by blanks in CSV, by commas in a table.
     List(Vec<Cell>),
     /// A nested JSON object.
     Object(Vec<(&'static str, Cell)>),
@@ -46,7 +46,7 @@ impl Cell {
         Cell::hex(id, 1)
     }
 
-    /// The same cell, which a table shows as `text`.
+    /// The same cell, shown as `text` in a table.
     #[must_use]
     pub fn shown_as(self, text: impl Into<String>) -> Cell {
         Cell::Shown(Box::new(self), text.into())
@@ -57,7 +57,7 @@ impl Cell {
         Cell::List(items.into_iter().map(Into::into).collect())
     }
 
-    /// The text of the cell in CSV. Text from a device cannot start a formula in a spreadsheet: it gets an apostrophe.
+    /// The text of the cell in CSV. An apostrophe is put before text that a spreadsheet could read as a formula.
     pub(super) fn in_csv(&self) -> String {
         let text = self.plain();
         let is_number = || text.parse::<f64>().is_ok();
@@ -127,7 +127,7 @@ impl Serialize for Cell {
                 }
                 map.end()
             }
-            // Nested rows have their columns outside; `Object` in `report.rs` writes them.
+            // The columns of nested rows are stored elsewhere, so `Object` in `report.rs` writes nested rows.
             Cell::Null | Cell::Rows(_) => serializer.serialize_none(),
         }
     }
@@ -146,7 +146,7 @@ impl From<bool> for Cell {
 }
 
 impl From<&str> for Cell {
-    /// Empty text is no value.
+    /// Empty text means no value.
     fn from(text: &str) -> Cell {
         if text.is_empty() { Cell::Null } else { Cell::Text(text.to_owned()) }
     }
@@ -159,7 +159,7 @@ impl From<&String> for Cell {
 }
 
 impl From<String> for Cell {
-    /// Empty text is no value.
+    /// Empty text means no value.
     fn from(text: String) -> Cell {
         if text.is_empty() { Cell::Null } else { Cell::Text(text) }
     }
@@ -196,14 +196,14 @@ impl From<Raw> for Cell {
 }
 
 impl From<Unit> for Cell {
-    /// The unit's symbol. A quantity without a unit has none.
+    /// The unit's symbol. A quantity without a unit has no symbol.
     fn from(unit: Unit) -> Cell {
         unit.to_string().into()
     }
 }
 
 impl From<&Value> for Cell {
-    /// A value of the object dictionary: numbers as numbers, everything else as text.
+    /// A value of the object dictionary: numbers as numbers, all other types as text.
     fn from(value: &Value) -> Cell {
         match value {
             Value::Bool(bit) => Cell::Bool(*bit),

@@ -1,11 +1,11 @@
-//! The cells of a CSV row: times, numbers and text. Nothing is allocated.
+//! Writes the cells of a CSV row: times, numbers and text, without allocations.
 
 use crate::bus::time::Wall;
 use crate::measure::sample::{Number, Raw};
 use std::io::{self, Write};
 use std::time::Duration;
 
-/// The separators of CSV: spreadsheets of different countries expect different ones.
+/// The separators of CSV. Spreadsheets in different countries expect different separators.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dialect {
     /// Separates two cells: one ASCII character.
@@ -22,7 +22,7 @@ impl Default for Dialect {
     }
 }
 
-/// How a time is written.
+/// The form of times.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TimeForm {
     /// `2023-11-14T22:13:21.010001Z`.
@@ -30,20 +30,20 @@ pub enum TimeForm {
     Rfc3339,
     /// Seconds since 1970-01-01 UTC, with microseconds.
     Unix,
-    /// Days since 1899-12-30 UTC, as spreadsheets count them.
+    /// Days since 1899-12-30 UTC, as in spreadsheets.
     Excel,
 }
 
 /// The UTF-8 byte order mark.
 pub(super) const BOM: &[u8] = b"\xef\xbb\xbf";
 
-/// From 1899-12-30 to 1970-01-01.
+/// Days from 1899-12-30 to 1970-01-01.
 const DAYS_BEFORE_1970: u64 = 25_569;
 
 /// Microseconds of a day.
 const DAY_US: u128 = 86_400_000_000;
 
-/// Decimals of a day: finer than a microsecond.
+/// Decimal digits of a day, finer than a microsecond.
 const DAY_DIGITS: usize = 11;
 
 /// Writes times. The text of a second is kept until the next second.
@@ -80,7 +80,7 @@ impl Times {
                     use std::fmt::Write as _;
                     self.text.clear();
                     self.second = None;
-                    // RFC 3339 has no years beyond 9999, and `system_time` ends there.
+                    // RFC 3339 and `system_time` do not allow years after 9999.
                     if wall > Wall::LAST {
                         return Err(io::Error::other("a time after the year 9999"));
                     }
@@ -98,7 +98,7 @@ impl Times {
             TimeForm::Excel => {
                 let rest = since.as_micros() % DAY_US;
                 let scale = 10u128.pow(11);
-                // Half a unit is added for rounding, which may carry into the next day.
+                // Half a unit is added for rounding. The result may be in the next day.
                 let fraction = (rest * scale + DAY_US / 2) / DAY_US;
                 let days = u64::try_from(since.as_micros() / DAY_US + fraction / scale).unwrap_or(u64::MAX);
                 push_number(out, days.saturating_add(DAYS_BEFORE_1970));
@@ -134,7 +134,7 @@ fn push_padded(out: &mut Vec<u8>, mut number: u64, width: usize) {
     out.extend_from_slice(&digits[at..]);
 }
 
-/// A measured number; nothing if there is none.
+/// Writes a measured number; writes nothing for `None`.
 pub(super) fn push_value(out: &mut Vec<u8>, value: Option<Number>, decimal: u8) -> io::Result<()> {
     match value {
         None => {}
@@ -219,7 +219,7 @@ mod tests {
         // 45244 is 2023-11-14; 22:13:21.010001 of 24 hours is 0.92593761575.
         assert_eq!(time(TimeForm::Excel, since), "45244.92593761575");
         assert_eq!(time(TimeForm::Excel, Duration::ZERO), "25569.00000000000");
-        // Half a day, and the last microsecond of one.
+        // Half a day, and the last microsecond of a day.
         assert_eq!(time(TimeForm::Excel, Duration::from_secs(43_200)), "25569.50000000000");
         assert_eq!(time(TimeForm::Excel, Duration::from_micros(86_399_999_999)), "25569.99999999999");
     }

@@ -1,4 +1,4 @@
-//! The file formats of a recording. Each one is a file of its own in this folder.
+//! The file formats of a recording. Each format has its own file in this folder.
 
 mod csv;
 mod json_lines;
@@ -21,11 +21,11 @@ pub enum FileFormat {
     JsonLines,
 }
 
-/// The values of `--format`. A format that only recordings have is a [`Format::Recording`].
+/// The values of `--format`. A format only for recordings is a [`Format::Recording`].
 pub const CHOICES: &[Format] = &[Format::Text, Format::Json, Format::Csv];
 
 impl From<Format> for FileFormat {
-    /// Files and pipes get CSV unless another format is requested.
+    /// Files and pipes use CSV unless another format is requested.
     fn from(format: Format) -> FileFormat {
         match format {
             Format::Text | Format::Csv => FileFormat::Csv,
@@ -35,7 +35,7 @@ impl From<Format> for FileFormat {
     }
 }
 
-/// Turns typed rows into lines.
+/// Converts typed rows to lines.
 pub(super) trait RowFormat: Debug {
     /// The lines before the first row of a file; empty if the format has none.
     fn header(&self, columns: Columns<'_>) -> Vec<u8>;
@@ -57,7 +57,7 @@ pub(super) trait RowFormat: Debug {
 }
 
 impl FileFormat {
-    /// Its name on the command line.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             FileFormat::Csv => "csv",
@@ -79,11 +79,11 @@ impl FileFormat {
     }
 }
 
-/// A file to be continued has other columns than the rows to come.
+/// The columns of an existing file differ from those of the new rows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HeaderMismatch {
     /// The first line of the file.
     pub found: String,
-    /// The columns of the rows to come.
+    /// The columns of the new rows.
     pub expected: String,
 }

@@ -1,4 +1,4 @@
-//! Writes whole lines, directly or in a thread. The thread keeps a slow disk or a blocked pipe from stopping the
+//! Writes whole lines, directly or in a thread. With the thread, a slow disk or a blocked pipe does not stop the
 //! reception of frames.
 
 use super::series::Series;
@@ -8,13 +8,13 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// How many bytes wait for a slow target. More are lost.
+/// The largest number of bytes that wait for a slow target. Further rows are lost.
 pub const QUEUE_CAPACITY: usize = 12 * 1024 * 1024;
 
-/// How often [`LineWriter::finish`] asks whether to stop waiting.
+/// The interval at which [`LineWriter::finish`] asks whether to stop waiting.
 const GIVE_UP_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Something to be written.
+/// Lines to be written.
 #[derive(Debug)]
 enum Job {
     /// The lines before the first row.
@@ -30,7 +30,7 @@ impl Job {
         }
     }
 
-    /// Its share of the queue. The writer waits for an empty job as well.
+    /// The size of the job in the queue. An empty job also has a size, because the writer waits for it.
     fn cost(&self) -> usize {
         self.bytes().len() + 1
     }
@@ -51,13 +51,13 @@ impl Job {
     }
 }
 
-/// Takes lines.
+/// Writes lines.
 #[derive(Debug)]
 pub struct LineWriter(Inner);
 
 #[derive(Debug)]
 enum Inner {
-    /// The caller waits until its lines are written.
+    /// The caller waits until the lines are written.
     Direct { writer: TargetWriter, has_failed: bool, lost: u64 },
     /// A thread writes.
     Queued { queue: Arc<Queue>, capacity: usize, overflowed: u64, lost: u64 },
@@ -73,22 +73,22 @@ struct Queue {
 #[derive(Debug, Default)]
 struct QueueState {
     jobs: VecDeque<Job>,
-    /// Cost of the jobs, and of the job being written.
+    /// Total size of the jobs, including the job being written.
     bytes: usize,
-    /// Rows in them.
+    /// Rows in these jobs.
     rows: u64,
     error: Option<io::Error>,
     changes: Vec<FileChange>,
     has_failed: bool,
     /// Rows that could not be written.
     lost: u64,
-    /// No more jobs will be added.
+    /// Whether the queue is closed for new jobs.
     is_closed: bool,
 }
 
 impl Queue {
     fn lock(&self) -> MutexGuard<'_, QueueState> {
-        // No change of the state can be interrupted by a panic.
+        // A poisoned lock is harmless, because a panic cannot interrupt a change of the state.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -111,7 +111,7 @@ impl Queue {
                 job.run(&mut writer).map_err(|(error, lost)| (Some(error), lost))
             };
             let mut state = self.lock();
-            // `finish` may have given up and counted these rows as lost.
+            // `finish` may have stopped waiting and counted these rows as lost.
             state.bytes = state.bytes.saturating_sub(job.cost());
             state.changes.append(&mut writer.take_changes());
             state.rows = state.rows.saturating_sub(job.rows());
@@ -127,12 +127,12 @@ impl Queue {
 }
 
 impl LineWriter {
-    /// Writes each block before the call returns: for a bus that waits.
+    /// Writes each block before the call returns. For a bus that waits for the program.
     pub fn direct(target: OutputTarget, series: Option<Series>) -> LineWriter {
         LineWriter(Inner::Direct { writer: TargetWriter::new(target, series), has_failed: false, lost: 0 })
     }
 
-    /// Writes in a thread. At most `capacity` bytes wait; rows beyond are lost.
+    /// Writes in a thread. At most `capacity` bytes wait; further rows are lost.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -144,29 +144,29 @@ impl LineWriter {
         Ok(LineWriter(Inner::Queued { queue, capacity, overflowed: 0, lost: 0 }))
     }
 
-    /// Takes the header of the next file of the series. A header is never lost.
+    /// Starts the next file of the series with this header. A header is never lost.
     pub(super) fn start_file(&mut self, bytes: Vec<u8>) -> io::Result<()> {
         self.put(Job::Header { place: HeaderPlace::NextFile, bytes })
     }
 
-    /// Takes the header that the file already has or gets with its first row. The file gets it again if another program
-    /// truncates it.
+    /// Sets the header of the file, which is already there or comes with the first row. It is written again if another
+    /// program truncates the file.
     pub(in crate::output) fn keep_header(&mut self, bytes: Vec<u8>) -> io::Result<()> {
         self.put(Job::Header { place: HeaderPlace::Present, bytes })
     }
 
-    /// Takes lines that stand before rows in the current file. They are never lost.
+    /// Writes lines before further rows in the current file. These lines are never lost.
     pub(in crate::output) fn put_header(&mut self, bytes: Vec<u8>) -> io::Result<()> {
         self.put(Job::Header { place: HeaderPlace::CurrentFile, bytes })
     }
 
-    /// Takes this many rows and empties the block.
+    /// Writes this many rows, and empties the block.
     pub(in crate::output) fn put_rows(&mut self, block: &mut Vec<u8>, rows: u64) -> io::Result<()> {
         if block.is_empty() {
             return self.check();
         }
         if let Inner::Direct { writer, has_failed: has_failed @ false, lost } = &mut self.0 {
-            // The caller uses the same block again: no allocation.
+            // The caller uses the block again, without an allocation.
             let result = writer.write_rows(block, rows);
             block.clear();
             return result.map_err(|(error, lost_rows)| {
@@ -248,7 +248,7 @@ impl LineWriter {
         }
     }
 
-    /// Rows that came too fast or could not be written.
+    /// Rows that were lost because writing was too slow or failed.
     pub fn lost(&self) -> u64 {
         match &self.0 {
             Inner::Direct { lost, .. } => *lost,
@@ -256,7 +256,7 @@ impl LineWriter {
         }
     }
 
-    /// Rows that came too fast.
+    /// Rows that were lost because writing was too slow.
     pub(super) fn overflowed(&self) -> u64 {
         match &self.0 {
             Inner::Direct { .. } => 0,

@@ -1,21 +1,21 @@
-//! Reads the contents of a file that is to be continued.
+//! Reads the contents of a file to which rows will be appended.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// The first line of a file, and how far its whole lines go.
+/// The first line of a file, and the length of its whole lines.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExistingLines {
     /// The first line, without line end and byte order mark.
     pub header: String,
-    /// Bytes of all whole lines. A last line without line end was cut off by a kill.
+    /// Bytes of all whole lines. A last line without a line end was cut off when the program was killed.
     pub length: u64,
 }
 
 /// A longer first line is not a header.
 const MAX_HEADER: u64 = 1 << 20;
 
-/// How many bytes are read at a time.
+/// The number of bytes per read.
 const CHUNK: u64 = 64 * 1024;
 
 /// Reads a file that is open for reading; `None` if it has no whole line.

@@ -1,4 +1,4 @@
-//! When the next file of a recording starts.
+//! Decides when the next file of a recording starts.
 
 use std::time::Duration;
 
@@ -11,13 +11,13 @@ pub enum Rotation {
     Size(u64),
 }
 
-/// The file being written, as far as rotation depends on it.
+/// The facts about the current file that rotation needs.
 #[derive(Debug)]
 pub(super) struct CurrentFile {
     rotation: Option<Rotation>,
     bytes: u64,
     rows: u64,
-    /// `elapsed_s` of the first row that belongs into the next file.
+    /// `elapsed_s` at which the next file starts.
     ends_at: Duration,
 }
 
@@ -31,8 +31,8 @@ impl CurrentFile {
         (self.bytes, self.rows) = (header_bytes as u64, 0);
     }
 
-    /// Sets the end of the file whose first row has this time: a whole multiple of the interval, so that the
-    /// seams do not drift.
+    /// Sets the end of the file whose first row has this time. The end is a whole multiple of the interval, to avoid
+    /// drift.
     pub(super) fn set_end(&mut self, elapsed: Duration) {
         if let Some(Rotation::Every(interval)) = self.rotation {
             let excess = elapsed.as_nanos() % interval.as_nanos().max(1);
@@ -40,12 +40,12 @@ impl CurrentFile {
         }
     }
 
-    /// Whether a row of this time belongs into the next file.
+    /// Whether a row of this time belongs to the next file.
     pub(super) fn is_over(&self, elapsed: Duration) -> bool {
         matches!(self.rotation, Some(Rotation::Every(_))) && elapsed >= self.ends_at
     }
 
-    /// Whether a row of this many bytes fits. The first row of a file always does.
+    /// Whether a row of this many bytes fits. The first row of a file always fits.
     pub(super) fn has_room(&self, row_bytes: usize) -> bool {
         match self.rotation {
             Some(Rotation::Size(max)) => self.rows == 0 || self.bytes + row_bytes as u64 <= max,

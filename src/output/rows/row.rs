@@ -1,4 +1,4 @@
-//! Typed rows, which a format writes.
+//! Typed rows, independent of the file format.
 
 use crate::bus::Wall;
 use crate::measure::sample::{Number, Sample, Source, Status};
@@ -49,7 +49,7 @@ impl<'a> Values<'a> {
 pub(super) struct Cell {
     /// The number; `None` if it is invalid.
     pub(super) value: Option<Number>,
-    /// `None` if the device reports no status.
+    /// The status; `None` if the device reports none.
     pub(super) status: Option<Status>,
 }
 
@@ -63,7 +63,7 @@ impl Cell {
 /// The columns of one signal in layout `wide`.
 #[derive(Clone, Debug)]
 pub(super) struct Column {
-    /// The number of the source whose values it contains.
+    /// The number of the source of the values.
     pub(super) number: usize,
     /// Node, signal and unit.
     pub(super) source: Source,
@@ -77,14 +77,14 @@ impl Column {
     /// The columns of the source with this number.
     pub(super) fn new(number: usize, source: &Source) -> Column {
         let name = format!("{}.{}", source.node, source.signal);
-        // A status object that was requested as a signal contains bits, not one of the status words.
+        // A status object that was requested as a signal contains bits, not a status word.
         let unit = if source.signal.ends_with(".status") { "code" } else { &*source.unit };
         let status_name = format!("{name}.status");
         let value_name = if unit.is_empty() { name } else { format!("{name} [{unit}]") };
         Column { number, source: source.clone(), value_name, status_name }
     }
 
-    /// Whether it shows the same signal of the same node, in any unit.
+    /// Whether the column is for the same signal of the same node, in any unit.
     pub(super) fn is_same_signal(&self, source: &Source) -> bool {
         (self.source.node, &self.source.signal) == (source.node, &source.signal)
     }
@@ -93,7 +93,7 @@ impl Column {
 /// The columns of all rows until they change.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Columns<'a> {
-    /// Layout `long`: always the same ones.
+    /// Layout `long`: always the same columns.
     Long,
     /// Layout `wide`: time and elapsed time, then two per signal.
     Wide(&'a [Column]),

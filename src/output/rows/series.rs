@@ -12,18 +12,18 @@ pub struct Series {
     base: PathBuf,
     next: u32,
     force: bool,
-    /// The last file of an earlier run, and its length without the line that was cut off.
+    /// The last file of an earlier run, and its length without an incomplete line.
     last: Option<(File, u64)>,
 }
 
 impl Series {
-    /// The files `run-NNNN.csv` for the `base` `run.csv`, from the number `next`. With `force` existing files are
-    /// overwritten; without it their numbers are skipped.
+    /// The files `run-NNNN.csv` for the `base` `run.csv`, from the number `next`. With `force`, existing files are
+    /// overwritten; otherwise their numbers are skipped.
     pub fn new(base: &Path, next: u32, force: bool) -> Series {
         Series { base: base.to_owned(), next, force, last: None }
     }
 
-    /// Before the first row is written, cuts the last file of an earlier run to this many bytes.
+    /// Truncates the last file of an earlier run to this many bytes, before the first row is written.
     #[must_use]
     pub fn with_last(self, file: File, length: u64) -> Series {
         Series { last: Some((file, length)), ..self }
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(fs::read_to_string(folder.path().join("run-0002.csv")).expect("read"), "run-0002.csv");
         let first = Series::new(&base, 2, true).create().expect("overwritten");
         assert_eq!(fs::read_to_string(folder.path().join("run-0002.csv")).expect("read"), "");
-        // A file that is being written is not overwritten.
+        // A file in use by a writer is not overwritten.
         let (second, _file) = Series::new(&base, 2, true).create().expect("overwritten");
         assert_eq!((first.0, second), (Series::name(&base, 2), Series::name(&base, 3)));
     }

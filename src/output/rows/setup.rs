@@ -1,40 +1,40 @@
-//! How a recording is written.
+//! The settings for writing a recording.
 
 use super::cells::{Dialect, TimeForm};
 use super::format::{FileFormat, HeaderMismatch};
 use super::rotation::Rotation;
 use super::row::Columns;
 
-/// The layout: whether a value or a cycle makes a row.
+/// The layout: one row per value, or one row per cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layout {
-    /// One value.
+    /// One row per value.
     #[default]
     Long,
-    /// All values of one cycle.
+    /// One row per cycle.
     Wide,
 }
 
-/// How a recording is written.
+/// The settings for writing a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Setup {
     /// The file format.
     pub format: FileFormat,
-    /// The layout: whether a value or a cycle makes a row.
+    /// The layout: one row per value, or one row per cycle.
     pub layout: Layout,
     /// Separators of CSV.
     pub dialect: Dialect,
-    /// How times are written.
+    /// The form of times.
     pub time: TimeForm,
     /// When the next file starts.
     pub rotation: Option<Rotation>,
     /// The recording ends after this many rows.
     pub max_rows: Option<u64>,
-    /// Whether other columns start a new file. If not, they follow in the same one.
+    /// Whether other columns start a new file. If not, they follow in the same file.
     pub has_series: bool,
     /// Whether the first file already has its header.
     pub continues: bool,
-    /// The first line of the file to be continued, or of the last file of the series.
+    /// The first line of the existing file, or of the last file of the series.
     pub existing_header: Option<String>,
 }
 

@@ -1,6 +1,6 @@
-//! Takes typed rows: formats them, starts the next file when one is due, and hands whole lines to the writer.
+//! Formats typed rows, starts the next file when it is due, and passes whole lines to the writer.
 //!
-//! Nothing here depends on the format.
+//! This module does not depend on the format.
 
 use super::format::{HeaderMismatch, RowFormat};
 use super::line_writer::LineWriter;
@@ -16,16 +16,16 @@ use std::time::Duration;
 /// Lines are collected up to this many bytes.
 const BLOCK_SIZE: usize = 32 * 1024;
 
-/// The longest time that a row waits before it is handed to the writer.
+/// The longest time that a row waits before it is passed to the writer.
 pub(in crate::output) const MAX_DELAY: Duration = Duration::from_millis(500);
 
-/// Takes rows.
+/// Formats and passes on rows.
 #[derive(Debug)]
 pub(super) struct RowSink {
     writer: LineWriter,
     format: Box<dyn RowFormat>,
     setup: Setup,
-    /// Formatted rows that are not handed over yet.
+    /// Formatted rows that are not passed to the writer yet.
     block: Vec<u8>,
     block_rows: u64,
     /// When the first row in the block was received.
@@ -59,7 +59,7 @@ impl RowSink {
         self.setup.check_columns(columns)
     }
 
-    /// Takes a row; `at` is the time of its first value. Rows that are too many are ignored.
+    /// Adds a row; `at` is the time of its first value. Rows above the maximum number are ignored.
     pub(super) fn put(&mut self, at: Stamp, values: Values<'_>) -> io::Result<()> {
         if self.is_complete() {
             return Ok(());
@@ -84,7 +84,7 @@ impl RowSink {
         if self.block.len() >= BLOCK_SIZE { self.flush() } else { Ok(()) }
     }
 
-    /// Makes sure that a row of this time has a file with a header.
+    /// Prepares a file with a header for a row of this time.
     fn prepare_file(&mut self, elapsed: Duration, columns: Columns<'_>) -> io::Result<()> {
         if self.rows == 0 {
             let header = self.format.header(columns);
@@ -110,7 +110,7 @@ impl RowSink {
         self.writer.start_file(header)
     }
 
-    /// The following rows have other columns.
+    /// Changes the columns for the following rows.
     pub(super) fn change_columns(&mut self, columns: Columns<'_>) -> io::Result<()> {
         if self.rows == 0 && !self.setup.continues {
             return Ok(());
@@ -125,7 +125,7 @@ impl RowSink {
         }
     }
 
-    /// Hands over the rows that have waited long enough.
+    /// Passes on the rows that have waited long enough.
     pub(super) fn advance(&mut self, now: Mono) -> io::Result<()> {
         match self.oldest {
             Some(oldest) if now.since(oldest) >= MAX_DELAY => self.flush(),
@@ -139,7 +139,7 @@ impl RowSink {
         self.writer.put_rows(&mut self.block, rows)
     }
 
-    /// Hands over everything and waits until it is written, or until `give_up` returns true.
+    /// Passes on all rows, and waits until they are written or `give_up` returns true.
     pub(super) fn finish(&mut self, give_up: &mut dyn FnMut() -> bool) -> io::Result<()> {
         self.flush().and(self.writer.finish(give_up))
     }
@@ -149,12 +149,12 @@ impl RowSink {
         self.setup.max_rows.is_some_and(|max| self.rows >= max)
     }
 
-    /// Rows taken so far.
+    /// The number of rows so far.
     pub(super) fn rows(&self) -> u64 {
         self.rows
     }
 
-    /// Rows that could not be written or came too fast.
+    /// Rows that were lost because writing was too slow or failed.
     pub(super) fn lost(&self) -> u64 {
         self.writer.lost() + self.rows_without_file
     }
@@ -164,7 +164,7 @@ impl RowSink {
         self.writer.take_changes()
     }
 
-    /// Rows that came too fast.
+    /// Rows that were lost because writing was too slow.
     pub(super) fn overflowed(&self) -> u64 {
         self.writer.overflowed()
     }

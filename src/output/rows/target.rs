@@ -1,4 +1,4 @@
-//! Where lines are written: a file, a series of files, or a stream. A failure leaves whole lines only.
+//! The target of lines: a file, a series of files, or a stream. After a failure, files contain only whole lines.
 
 use super::series::Series;
 use crate::bus::file::{NameChange, name_change};
@@ -6,16 +6,16 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Where lines are written.
+/// The target of lines.
 #[derive(Debug)]
 pub enum OutputTarget {
     /// A file. A regular file keeps its first `keep` bytes; the first line replaces the rest.
     File {
-        /// Open for appending.
+        /// The file, open for appending.
         file: File,
         /// Its name.
         path: PathBuf,
-        /// How many of its bytes are kept.
+        /// The number of bytes that are kept.
         keep: u64,
     },
     /// stdout, a pipe, a device.
@@ -30,26 +30,26 @@ impl<T: Write + std::fmt::Debug + Send> Stream for T {}
 /// A change of a file by another program while it was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileChange {
-    /// The file became shorter. It gets its header again.
+    /// The file became shorter. The header is written again.
     Shortened(PathBuf),
-    /// The file was moved. The rows follow it.
+    /// The file was moved. Further rows go to the moved file.
     Moved(PathBuf),
-    /// The file was deleted, and its rows with it.
+    /// The file was deleted together with its rows.
     Deleted(PathBuf),
 }
 
-/// Where the lines before the first row of a file go.
+/// The place of the header lines of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum HeaderPlace {
-    /// They start the next file of the series.
+    /// The lines start the next file of the series.
     NextFile,
-    /// They go to the current file, now.
+    /// The lines go to the current file.
     CurrentFile,
-    /// The current file has them, or gets them together with the first row.
+    /// The current file has the lines, or they come with the first row.
     Present,
 }
 
-/// A failed write, and how many rows were lost with it.
+/// A failed write, and the number of lost rows.
 pub(super) type WriteFailure = (io::Error, u64);
 
 /// Writes lines to a target. With a series, later lines go to further files.
@@ -110,7 +110,7 @@ impl TargetWriter {
         })
     }
 
-    /// Before the first line: removes the bytes of the file that are not kept.
+    /// Removes the bytes of the file that are not kept, before the first line.
     fn prepare(&mut self) -> io::Result<()> {
         if std::mem::replace(&mut self.is_prepared, true) {
             return Ok(());
@@ -127,8 +127,8 @@ impl TargetWriter {
         Ok(())
     }
 
-    /// Detects changes of the file by other programs since the last write. A file that became shorter gets its header
-    /// again.
+    /// Detects changes of the file by other programs since the last write. If the file became shorter, the header is
+    /// written again.
     pub(super) fn check_file(&mut self) -> io::Result<()> {
         let OutputTarget::File { file, path, .. } = &self.target else { return Ok(()) };
         let metadata = file.metadata()?;
@@ -157,7 +157,7 @@ impl TargetWriter {
     }
 }
 
-/// Writes all of `bytes`. The error comes with the number of bytes that were kept: whole lines.
+/// Writes all of `bytes`. After an error, returns also the number of kept bytes, which are whole lines.
 fn write_lines(target: &mut OutputTarget, bytes: &[u8]) -> Result<(), (io::Error, usize)> {
     let mut done = 0;
     while done < bytes.len() {
@@ -178,7 +178,7 @@ fn write_lines(target: &mut OutputTarget, bytes: &[u8]) -> Result<(), (io::Error
     Ok(())
 }
 
-/// Cuts a file back to its last whole line. `done` of `bytes` were written; returns how many of them are kept.
+/// Cuts a file back to its last whole line. `done` of `bytes` were written; returns the number of kept bytes.
 fn cut_partial_line(target: &mut OutputTarget, bytes: &[u8], done: usize) -> usize {
     let whole = bytes[..done].iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
     if let OutputTarget::File { file, .. } = target {
@@ -230,7 +230,7 @@ mod tests {
         writer.write_rows(b"ddd\n", 1).expect("written");
         assert_eq!(std::fs::read_to_string(&path).expect("read"), "head\ncc\nhead\nddd\n");
         assert_eq!(writer.take_changes(), vec![FileChange::Shortened(path.clone()); 2]);
-        // A file that became longer is continued at its end.
+        // If a file became longer, rows are appended at its end.
         std::fs::write(&path, "a much longer text of another program\n").expect("written");
         writer.write_rows(b"eee\n", 1).expect("written");
         assert_eq!(std::fs::read_to_string(&path).expect("read"), "a much longer text of another program\neee\n");

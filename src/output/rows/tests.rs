@@ -1,4 +1,4 @@
-//! Rows as files and streams receive them.
+//! Tests of rows in files and streams.
 
 use super::*;
 use crate::bus::{Mono, Wall};
@@ -222,7 +222,7 @@ fn no_row_waits_longer_than_half_a_second() {
             let handed_over = shared.text().lines().skip(1).count() as u64;
             assert!(number + 1 - handed_over <= 50, "{handed_over} of {}", number + 1);
         }
-        // The last rows do not wait for others.
+        // The last rows do not wait for further rows.
         rows.advance(at(199 * 10_000 + 500_000)).expect("memory");
         assert_eq!(shared.text().lines().count(), 201);
     }

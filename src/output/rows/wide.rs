@@ -1,8 +1,8 @@
 //! The wide layout: one row per cycle of SYNC or polling, with two columns per signal.
 //!
-//! A value belongs to the cycle in which it was received; a polled value to the cycle in which it was requested.
-//! A row is complete when every column has a value. If values are missing, it waits for another cycle, at most
-//! half a second. Later values, and a second value of a signal in one cycle, are left out.
+//! A value belongs to the cycle in which it was received; a polled value, to the cycle in which it was requested. A row
+//! is complete when every column has a value. An incomplete row waits for one more cycle, at most half a second. Later
+//! values, and second values of a signal in one cycle, are omitted.
 
 use super::row::{Cell, Column};
 use crate::bus::{Mono, Stamp};
@@ -29,8 +29,8 @@ impl Cycle {
         self.filled == self.cells.len()
     }
 
-    /// The time of the row: that of its first value. If no value was received before the next cycle, the row
-    /// gets the start of its own cycle: rows stay in order of time.
+    /// The time of the row: that of its first value. If no value was received before the next cycle, it is the start of
+    /// the cycle, so that rows are in order of time.
     fn at(&self, next: Option<Mono>) -> Stamp {
         self.first.filter(|first| next.is_none_or(|next| first.mono < next)).unwrap_or(self.start)
     }
@@ -40,12 +40,12 @@ impl Cycle {
 #[derive(Debug, Default)]
 pub(super) struct Wide {
     columns: Vec<Column>,
-    /// For each source the place of its column.
+    /// The index of the column of each source.
     places: Vec<Option<usize>>,
     open: VecDeque<Cycle>,
-    /// Whether a cycle had a value. Empty cycles before the first value make no rows.
+    /// Whether any cycle had a value. Empty cycles before the first value are skipped.
     has_values: bool,
-    /// Values that are in no row.
+    /// Values that are not in any row.
     pub(super) left_out: u64,
 }
 
@@ -63,7 +63,7 @@ impl Wide {
         }
     }
 
-    /// The columns of the rows to come.
+    /// The columns of the next rows.
     pub(super) fn columns(&self) -> &[Column] {
         &self.columns
     }
@@ -79,8 +79,8 @@ impl Wide {
         self.places.get(sample.source).is_some_and(Option::is_some)
     }
 
-    /// Adds a column for the source of a sample. It replaces the column of the same signal, or follows the last
-    /// one of its node. Open cycles get the column as well.
+    /// Adds a column for the source of a sample. The column replaces that of the same signal, or follows the last
+    /// column of its node. Open cycles also get the column.
     pub(super) fn add_column(&mut self, sample: &Sample, sources: &[Source]) {
         let Some(new) = sources.get(sample.source) else { return };
         let column = Column::new(sample.source, new);
@@ -98,7 +98,7 @@ impl Wide {
         self.index(sources.len());
     }
 
-    /// Takes a sample. A polled sample comes with the number of the cycle in which it was requested.
+    /// Adds a sample. A polled sample has the number of the cycle in which it was requested.
     pub(super) fn put(&mut self, number: Option<u64>, sample: &Sample) {
         let place = self.places.get(sample.source).copied().flatten();
         let cycle = match number {
@@ -118,8 +118,7 @@ impl Wide {
         cycle.first.get_or_insert(sample.at);
     }
 
-    /// The next row that can be written now, with its time. With `all_but_last` no row waits, except that of the
-    /// last cycle.
+    /// The next row that can be written now, with its time. With `all_but_last`, only the row of the last cycle waits.
     pub(super) fn pop(&mut self, now: Mono, all_but_last: bool) -> Option<(Stamp, Cycle)> {
         loop {
             let next = self.open.get(1).map(|next| next.start.mono);
@@ -137,7 +136,7 @@ impl Wide {
         }
     }
 
-    /// The next row at the end of the recording. Empty cycles after the last value make no rows.
+    /// The next row at the end of the recording. Empty cycles after the last value are skipped.
     pub(super) fn drain(&mut self) -> Option<(Stamp, Cycle)> {
         while self.open.iter().any(|cycle| cycle.filled > 0) {
             let next = self.open.get(1).map(|next| next.start.mono);
@@ -212,7 +211,7 @@ mod tests {
         let mut wide = two();
         wide.start_cycle(0, at(0));
         wide.put(None, &sample(2, 0, 1));
-        // The program was late: it reads a frame after the SYNC that was received before it.
+        // The program is late: it processes a frame after the start of the next cycle.
         wide.start_cycle(1, at(10));
         wide.put(None, &sample(9, 1, 2));
         wide.put(None, &sample(12, 1, 4));
@@ -238,7 +237,7 @@ mod tests {
         // The row of this cycle is already written.
         wide.put(Some(1), &sample(31, 1, 9));
         assert_eq!(wide.left_out, 1);
-        // Received in the next cycle: the row gets the start of its own cycle.
+        // Received in the next cycle, so the time of the row is the start of its own cycle.
         wide.put(Some(2), &sample(33, 0, 5));
         wide.put(Some(3), &sample(34, 0, 6));
         assert_eq!(drained(&mut wide), ["20: 5 -", "34: 6 -"]);

@@ -85,7 +85,7 @@ impl RowFormat for CsvRows {
     }
 }
 
-/// A status word; nothing if the device reports no status.
+/// Writes a status word; writes nothing if the device reports no status.
 fn push_status(out: &mut Vec<u8>, status: Option<Status>) {
     out.extend_from_slice(status.map_or("", Status::as_str).as_bytes());
 }
