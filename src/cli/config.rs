@@ -46,6 +46,10 @@ enum Action {
     /// Compare a device with a file, two devices, or two files; exit 1 if anything differs
     Diff(diff::Diff),
     /// Configure a device from a file: check the file, write the differences, read everything back
+    // Not at the type: its deferred help would replace the line about the global options.
+    #[command(
+        after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply --table forty.csv mh4.toml --address --store --record forty.html\n  cangauge config apply 1 --rollback"
+    )]
     Apply(apply::Apply),
     /// Print the JSON Schema of the file, for editors
     Schema,

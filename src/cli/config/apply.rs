@@ -34,9 +34,6 @@ use std::path::{Path, PathBuf};
 /// settings. The old settings are kept in $XDG_STATE_HOME/cangauge (or ~/.local/state/cangauge) until the change is
 /// complete.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply --table forty.csv mh4.toml --address --store --record forty.html\n  cangauge config apply 1 --rollback"
-)]
 pub(super) struct Apply {
     /// Nodes (5, 0x7f, 1-16, 1,5, all), and the file
     #[arg(required = true, value_names = ["NODES", "FILE"], num_args = 1..=2)]
