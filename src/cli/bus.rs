@@ -128,7 +128,7 @@ impl Detect {
         let mut is_asking = false;
         let detection = detect(&mut *bus, self.active, self.time_per_rate.0, &mut |tried| {
             if tried.how == How::Asking && !std::mem::replace(&mut is_asking, true) {
-                console.note("no valid frame: now asking, which disturbs nodes at other bit rates");
+                console.note("no valid frame; now sending requests, which disturbs nodes at other bit rates");
             }
             console.note(&tried_line(tried));
         });
@@ -144,7 +144,7 @@ impl Detect {
         };
         global.print(std::slice::from_ref(&report))?;
         if by == By::Acknowledge {
-            console.warn("requests were acknowledged at this bit rate only, but no node answered");
+            console.warn("requests were acknowledged only at this bit rate, but no node answered");
         }
         Ok(())
     }

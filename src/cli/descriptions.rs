@@ -136,7 +136,7 @@ fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[N
             && has_profile_of(master, **node, &named.model)?;
         let writes = global.on_two_devices == OnTwoDevices::RefuseWrites;
         if !global.only_reads && (writes || !is_nearest) {
-            let hint = "name the file of this device, or use this one anyway: --accept-mismatch";
+            let hint = "choose the file of this device, or add --accept-mismatch";
             return Err(ErrorMessage::usage(message).hint(hint).into());
         }
         global.console().warn(&message);
@@ -173,7 +173,7 @@ fn named(global: &Global) -> anyhow::Result<Vec<Named>> {
         if named.iter().any(|other| other.node == given.node && other.is_eds == is_eds) {
             let kind = if is_eds { "EDS files" } else { "device descriptions" };
             let whom = given.node.map_or_else(|| "the same nodes".to_owned(), |node| format!("node {node}"));
-            let hint = "name one, or one for each node: NODE=FILE";
+            let hint = "choose one, or one for each node: NODE=FILE";
             return Err(ErrorMessage::usage(format!("two {kind} for {whom}")).hint(hint).into());
         }
         named.push(Named { node: given.node, is_eds, model: model(&given.what, is_eds, global)? });

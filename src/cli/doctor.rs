@@ -78,7 +78,7 @@ impl Doctor {
         global.print(findings)?;
         if findings.is_empty() {
             let nodes = if nodes == 1 { "1 node".to_owned() } else { format!("{nodes} nodes") };
-            global.console().note(&format!("{nodes}: nothing is wrong"));
+            global.console().note(&format!("{nodes}: no problem found"));
             return Ok(());
         }
         let count = if findings.len() == 1 { "1 finding".to_owned() } else { format!("{} findings", findings.len()) };

@@ -53,10 +53,10 @@ impl Export {
         for message in &messages {
             let tpdo = format!("node {}: TPDO{}", message.node, message.number.get());
             for object in &message.unknown {
-                console.warn(&format!("{tpdo}: the type or the decimal digits of {object} are unknown: left out"));
+                console.warn(&format!("{tpdo}: the type or the decimal digits of {object} are unknown: omitted"));
             }
             if message.is_shared {
-                console.warn(&format!("{tpdo}: another node has the same COB-ID 0x{}: left out", message.id));
+                console.warn(&format!("{tpdo}: another node has the same COB-ID 0x{}: omitted", message.id));
             }
         }
         if failures.len() < asked {

@@ -198,7 +198,7 @@ impl Activate {
         })?;
         let silent = crate::bus::time::format_duration(2 * self.delay.0);
         global.console().note(&format!(
-            "sent; devices do not acknowledge it. The new bit rate is active in {silent}: set the host to it"
+            "sent; devices do not acknowledge this. The new bit rate is active in {silent}: set the host to it"
         ));
         Ok(())
     }

@@ -477,7 +477,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
     }
     cli.command.run(&global)?;
     if cli.command.changes_devices() && matches!(&global.bus, Some(BusSpec::Sim(bench)) if !is_bench_file(bench)) {
-        global.console().note("the simulated devices start afresh with every command: they do not keep this change");
+        global.console().note("each command starts the simulated devices with default settings: this change is lost");
     }
     Ok(())
 }

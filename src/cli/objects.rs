@@ -104,7 +104,7 @@ fn of_node(global: &Global, node: NodeId) -> anyhow::Result<Arc<Model>> {
     found.and_then(|node| node.model).ok_or_else(|| {
         let message = format!("node {node}: no description is known for this device");
         let hint =
-            format!("name its EDS: cangauge objects {node} --eds FILE; or describe it: cangauge devices new {node}");
+            format!("add its EDS: cangauge objects {node} --eds FILE; or describe it: cangauge devices new {node}");
         ErrorMessage::usage(message).hint(hint).into()
     })
 }

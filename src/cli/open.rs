@@ -108,7 +108,7 @@ fn channels(global: &Global) -> Result<Vec<SdoChannel>, ErrorMessage> {
     };
     let channel = |named: &Channel| match named.node.or(only) {
         Some(node) => Ok(SdoChannel { node, request: named.request, response: named.response }),
-        None => Err(ErrorMessage::usage("--sdo does not say for which node").hint("name it: --sdo 5=0x645:0x5C5")),
+        None => Err(ErrorMessage::usage("the node of --sdo is missing").hint("add it: --sdo 5=0x645:0x5C5")),
     };
     global.sdo.iter().map(channel).collect()
 }

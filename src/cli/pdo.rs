@@ -218,7 +218,7 @@ impl MapArgs {
         if request.items.is_empty() && request.trigger.is_none() && parameters.iter().all(Option::is_none) {
             let hint = format!("show its settings: cangauge pdo show {} {}", self.node, self.pdo.get());
             return Err(ErrorMessage::usage(
-                "nothing to set: name signals, or use --transmission, --event-timer, --inhibit or --cob-id",
+                "nothing to set: add signals, or use --transmission, --event-timer, --inhibit or --cob-id",
             )
             .hint(hint)
             .into());

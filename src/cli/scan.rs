@@ -77,7 +77,7 @@ impl Scan {
         for silent in found.iter().filter(is_silent).filter(|_| !self.passive) {
             global
                 .console()
-                .note(&format!("node {}: it sends heartbeats and does not answer SDO requests", silent.node));
+                .note(&format!("node {}: it sends heartbeats, but does not answer SDO requests", silent.node));
         }
         let unknown = found.iter().find(|found| found.state.is_none()).filter(|_| !self.passive);
         if let Some(unknown) = unknown {

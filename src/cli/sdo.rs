@@ -308,12 +308,12 @@ impl WriteArgs {
                 if let Written::ReadBack(heard) = write(master, &node, at, &bytes, verify, &mut options)? {
                     let heard = heard.map(|frame| format!("; heard {frame}")).unwrap_or_default();
                     let message =
-                        format!("node {}: no answer to {at}{heard}; it was read back and holds the value", self.node);
+                        format!("node {}: no answer to {at}{heard}; it was read back and has the value", self.node);
                     global.console().note(&message);
                 }
                 if self.verify && !is_verifiable {
                     let message =
-                        format!("node {}: {at} acknowledged the signature; it cannot be read back", self.node);
+                        format!("node {}: {at} acknowledged the signature, which cannot be read back", self.node);
                     global.console().note(&message);
                 }
                 bar.finish();

@@ -32,7 +32,7 @@ pub fn reason(silence: &Silence) -> String {
         }
         SilenceCause::HeartbeatStopped => "its heartbeat stopped".to_owned(),
         SilenceCause::WrongLength { mapped, received } => {
-            format!("its TPDOs have {received} bytes, their mapping {mapped}")
+            format!("its TPDOs have {received} bytes, but their mapping has {mapped}")
         }
         SilenceCause::SharedCobId(id, other) => format!("node {other} sends TPDOs with the same COB-ID {id}"),
         SilenceCause::NoTpdo => "it has no TPDO".to_owned(),
@@ -87,7 +87,7 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
         TpdoCause::NothingMapped(Some(code @ 0xfe..)) => {
             format!("{number} is a multiplexed PDO ({mapping:04X}h:0 is {code:02X}h), which cannot be decoded")
         }
-        TpdoCause::NothingMapped(Some(0)) => format!("nothing is mapped into {number} ({mapping:04X}h:0 is 0)"),
+        TpdoCause::NothingMapped(Some(0)) => format!("nothing is mapped to {number} ({mapping:04X}h:0 is 0)"),
         TpdoCause::NothingMapped(_) => format!("the mapping of {number} could not be read ({mapping:04X}h)"),
         TpdoCause::OnlyOnRequest(code) => {
             format!("{number} is sent on remote request only ({communication:04X}h:2 is {code})")
@@ -124,11 +124,11 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
             format!("its analogue inputs are not sent on change ({object} is 0), and {number} has no event timer")
         }
         TpdoCause::NoTrigger(first, last) => format!(
-            "no event timer sends {number} ({communication:04X}h:2 and :5), and delta and limits are 0 ({first} to {last})"
+            "{number} has no event timer ({communication:04X}h:2 and :5), and delta and limits are 0 ({first} to {last})"
         ),
         TpdoCause::SendsOnChange => {
             format!(
-                "no event timer sends {number} ({communication:04X}h:2 and :5): its value does not change enough{also}"
+                "{number} has no event timer ({communication:04X}h:2 and :5), and its value does not change enough{also}"
             )
         }
         TpdoCause::Due(timer) => not_sent(number, &format!("every {timer} ms ({communication:04X}h:5)"), running),

@@ -92,7 +92,7 @@ fn words(finding: &Finding, interface: &str) -> Words {
             ("no-tpdo-received", message, Some(format!("find out more: cangauge doctor {node}")))
         }
         FindingCause::Absent(others) if others.is_empty() => {
-            ("no-answer", "it sends frames, and does not answer SDO requests".to_owned(), None)
+            ("no-answer", "it sends frames, but does not answer SDO requests".to_owned(), None)
         }
         FindingCause::Absent(others) => {
             let others: Vec<String> = others.iter().map(NodeId::to_string).collect();
@@ -105,7 +105,7 @@ fn words(finding: &Finding, interface: &str) -> Words {
         }
         FindingCause::OnlyHeartbeat(state) => {
             let message = format!("its heartbeat shows {state}, and it does not answer SDO requests");
-            ("no-answer", message, Some("if its SDO channel is another one, state it: --sdo 0xTX:0xRX".to_owned()))
+            ("no-answer", message, Some("if its SDO channel has other COB-IDs, add: --sdo 0xTX:0xRX".to_owned()))
         }
         FindingCause::Status(status) => ("status", format!("the status of its value is {}", status.as_str()), errors()),
         FindingCause::Register(text) => {
@@ -133,12 +133,12 @@ fn bus_words(cause: &FindingCause, interface: &str) -> Words {
             ("no-frame", message, Some(format!("check the power and the cable; {detect}")))
         }
         FindingCause::Unconfigured => {
-            let message = "no node answers, and a device without a node-ID is on the bus".to_owned();
+            let message = "no node answers, but a device without a node-ID is on the bus".to_owned();
             ("unconfigured", message, Some("cangauge lss scan".to_owned()))
         }
         FindingCause::Fault(fault, is_answered) => fault_words(*fault, *is_answered, detect),
         _ => {
-            let message = "frames are received, and no CANopen node answers".to_owned();
+            let message = "frames are received, but no CANopen node answers".to_owned();
             ("no-node", message, Some("show the frames: candump, or cangauge scan --passive --trace -".to_owned()))
         }
     }

@@ -168,7 +168,7 @@ impl AssignReport {
             Some(after) => {
                 format!("boot-up of node {new} after {:.2} s, identity confirmed", after.as_secs_f64())
             }
-            None => format!("node {new} answers, identity confirmed; no boot-up was seen"),
+            None => format!("node {new} answers, identity confirmed; no boot-up was received"),
         };
         let tpdos = ids.tpdos.iter().map(|(number, id)| format!("TPDO{number} has COB-ID 0x{id}"));
         Some(std::iter::once(boot_up).chain(tpdos).collect::<Vec<_>>().join("; "))
@@ -247,10 +247,9 @@ fn event(fact: &LssFact) -> NoteText {
             NoteText::new("changing-rate", format!("device and host change to {} in {delay_ms} ms", short(*bit_rate)))
         }
         LssEvent::AnswersAt { bit_rate } => NoteText::new("answers", format!("it answers at {}", short(*bit_rate))),
-        LssEvent::ObjectsInsteadOfLss => NoteText::new(
-            "objects-instead-of-lss",
-            "no LSS answer; its own objects are used instead, as its description allows (--via sdo)",
-        ),
+        LssEvent::ObjectsInsteadOfLss => {
+            NoteText::new("objects-instead-of-lss", "no LSS answer; its objects are used instead (--via sdo)")
+        }
         LssEvent::UnverifiedMethod { doubt } => {
             NoteText::new("unverified-method", format!("no document confirms this method: {doubt}"))
         }
@@ -260,7 +259,7 @@ fn event(fact: &LssFact) -> NoteText {
         ),
         LssEvent::SharedNodeId(node) => NoteText::new(
             "shared-node-id",
-            format!("another device has node-ID {node} too: it is not reset, since that would reset the other one"),
+            format!("another device also has node-ID {node}: a reset would also reset that device, so it is not sent"),
         ),
         LssEvent::AllSlavesChange(sign) => {
             NoteText::new("all-slaves-change", format!("{}: all of them accept the change", another(sign)))
@@ -280,8 +279,7 @@ fn cannot_exclude_others(service: UnansweredService) -> NoteText {
         UnansweredService::Identify => "LSS identify (46h to 4Bh)",
     };
     let message = format!(
-        "the device does not support {service}: only SDO shows that it is the only one, and a device that is stopped or \
-         has no node-ID does not answer SDO"
+        "the device does not support {service}: other devices that are stopped or have no node-ID cannot be excluded"
     );
     NoteText::new("cannot-exclude-others", message)
 }
@@ -289,7 +287,7 @@ fn cannot_exclude_others(service: UnansweredService) -> NoteText {
 fn more_unconfigured(last: LssAddress, reason: Option<&Reason>) -> NoteText {
     let reason = match reason {
         Some(reason) => reason.0.to_string(),
-        None => "it answers again although it was found".to_owned(),
+        None => "the same device answered again".to_owned(),
     };
     let message =
         format!("there may be more devices without a node-ID than {last} ({reason}): set its node-ID, then scan again");
@@ -302,7 +300,7 @@ pub(super) fn progress(progress: &Progress) -> String {
         Stage::NotDone => format!("{what} not configured"),
         Stage::Sent => format!("unknown whether {what} was accepted"),
         Stage::Done => format!("{what} configured"),
-        Stage::Reverted => format!("{what} set back"),
+        Stage::Reverted => format!("{what} restored"),
     };
     let id = progress.id.map(|(id, stage)| word(format!("node-ID {id}"), stage));
     let rate = progress.rate.map(|(rate, stage)| word(format!("bit rate {}", self::rate(rate)), stage));

@@ -70,9 +70,9 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> NoteText {
         Effect::NothingChanged => NoteText::new("nothing-changed", "nothing was changed"),
         Effect::InterfaceNotRestored { interface, bit_rate, reason } => NoteText::new(
             "interface-not-restored",
-            format!("{interface} was not set back to its previous bit rate: {reason}"),
+            format!("{interface} was not restored to its previous bit rate: {reason}"),
         )
-        .command("set it back", up_by_hand(interface, *bit_rate)),
+        .command("restore it", up_by_hand(interface, *bit_rate)),
         Effect::WasOperational => NoteText::new("was-operational", "the node was operational before")
             .command("start it again", format!("cangauge nmt start {number}")),
         Effect::Autozero(effect) => autozero::effect(&number, effect),
@@ -175,10 +175,10 @@ pub fn undone_text(write: &TemporaryWrite, undone: Undone) -> String {
     let TemporaryWrite { node, object, .. } = write;
     let [before, written] = [&write.before, &write.written].map(|bytes| value_text(bytes));
     let what = match undone {
-        Undone::Restored => format!("set back to {before}"),
+        Undone::Restored => format!("restored to {before}"),
         Undone::ChangedSince => "it has another value now and was not changed".to_owned(),
         Undone::OtherDevice => "another device has this node-ID now: nothing was changed".to_owned(),
-        Undone::NotRestored => format!("it could not be set back to {before}"),
+        Undone::NotRestored => format!("it could not be restored to {before}"),
     };
     format!("node {node}: an earlier run was killed and left {object} at {written}: {what}")
 }

@@ -183,14 +183,14 @@ impl Summary<'_> {
         if report.events.not_recorded > 0 {
             let count = grouped(report.events.not_recorded);
             lines.push(format!(
-                "{count} TPDOs or polled values made no row: the setup of their node had to be read again"
+                "{count} TPDOs or polled values were ignored while the setup of their node was read again"
             ));
         }
         lines.extend(syncs(&report.syncs));
         lines.extend(report.statistics.iter().map(|(source, statistics)| signal_line(source, statistics)));
         if written.left_out > 0 {
             lines.push(format!(
-                "{} values are in no row: late, or not the first in their cycle (--layout long contains all values)",
+                "{} values are not in any row: late, or not the first in their cycle (--layout long contains all values)",
                 grouped(written.left_out)
             ));
         }

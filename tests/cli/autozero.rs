@@ -138,7 +138,7 @@ fn device_without_autozero_is_refused() {
     Bench::of(ALL).run("autozero 3").fails(4, "cangauge: node 3: HBM SomatXR MC1609 has no autozero\n");
     Bench::of(ALL)
         .run("autozero 1 --channel 2")
-        .fails(2, "cangauge: node 1: WIKA MH-4-CAN has no autozero of channel 2\nhint: it has one of: 1\n");
+        .fails(2, "cangauge: node 1: WIKA MH-4-CAN has no autozero of channel 2\nhint: use one of: 1\n");
     // Without its description, the device itself rejects the object.
     let bench = Bench::of("mc1609@3");
     std::fs::write(bench.path("none.eds"), "[FileInfo]\nFileName=none.eds\n[1000]\nDataType=7\nAccessType=ro\n")
@@ -227,7 +227,7 @@ fn tare_sets_the_net_value_to_zero_and_back() {
             done.stderr
         );
         let done = bench.run(&format!("{state} tare 5 --channel 3")).exit(2);
-        assert!(done.stderr.contains("no tare of channel 3\nhint: it has one of: 1, 2\n"), "{}", done.stderr);
+        assert!(done.stderr.contains("no tare of channel 3\nhint: use one of: 1, 2\n"), "{}", done.stderr);
         let done = bench.run(&format!("{state} tare 5 --channel 2")).exit(0);
         assert!(done.stdout.starts_with("5  load2  50.00"), "{}", done.stdout);
         assert!(done.stdout.contains(" -> 0.00"), "{}", done.stdout);
@@ -246,7 +246,7 @@ fn tare_without_a_description_of_it_is_refused() {
         bench.run("tare 1").fails(
             2,
             "cangauge: node 1: no description or EDS of it has a tare (0x6139) and a net value (0x6140)\n\
-             hint: use one that has: --device FILE or --eds FILE\n",
+             hint: use a description with both: --device FILE or --eds FILE\n",
         );
     }
 }

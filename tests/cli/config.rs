@@ -97,7 +97,7 @@ fn with(section: &str, line: &str) -> String {
 const MISTAKES: [(&str, &str, &str); 34] = [
     ("node", "heartbeat = 500", "4:13: node.heartbeat: an integer instead of a duration in quotes (\"100ms\")"),
     ("node", "heartbeat = \"500\"", "4:13: node.heartbeat: \"500\" has no unit (100ms, 1s)"),
-    ("node", "heartbeat = \"500us\"", "4:13: node.heartbeat: the device counts in whole milliseconds"),
+    ("node", "heartbeat = \"500us\"", "4:13: node.heartbeat: the device needs a multiple of 1ms"),
     ("node", "heartbeat = \"70s\"", "4:13: node.heartbeat: 70000 does not fit u16 (0 to 65535)"),
     ("node", "hearbeat = \"500ms\"", "4:1: node.hearbeat: WIKA MH-4-CAN has no such setting (similar: node.heartbeat)"),
     ("node", "startup = \"never\"", "4:11: node.startup: \"never\" is not one of: wait, auto"),

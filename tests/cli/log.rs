@@ -351,7 +351,7 @@ fn passive_sends_nothing_and_needs_a_mapping() {
     let done = bench.run("log 5 --passive --duration 2s").exit(2);
     assert_eq!(
         done.stderr,
-        "cangauge: node 5: it sends TPDOs, and their mapping is unknown\n\
+        "cangauge: node 5: the mapping of its TPDOs is unknown\n\
          hint: name the device: --device 5=mh4 (or a file), or start recording before another master reads it\n"
     );
     assert_eq!(done.stdout, "");

@@ -103,7 +103,7 @@ fn silent_node_has_empty_cells() {
 #[test]
 fn second_value_in_a_cycle_is_omitted_and_counted() {
     let done = Bench::of("mh4@1,dps@127").run("log 1,127 --sync 1s --count 3 --layout wide --summary -").exit(0);
-    let said = "values are in no row: late, or not the first in their cycle (--layout long contains all values)";
+    let said = "values are not in any row: late, or not the first in their cycle (--layout long contains all values)";
     assert!(done.stderr.contains(said), "{}", done.stderr);
     let summary: serde_json::Value = serde_json::from_str(done.stdout.lines().last().expect("a line")).expect("JSON");
     assert_eq!(summary["rows"], 3);

@@ -145,7 +145,7 @@ fn watch_shows_boot_ups_and_states() {
 
 #[test]
 fn a_change_of_the_built_in_bench_is_not_kept() {
-    let note = "the simulated devices start afresh with every command: they do not keep this change";
+    let note = "each command starts the simulated devices with default settings: this change is lost";
     for line in ["nmt start 1", "unit 1 pressure psi", "store 127", "lss set-id 1 9", "sdo write 1 0x1017 100"] {
         let done = Bench::real("mh4@1,dps@127").run(line).exit(0);
         assert_eq!(done.stderr.matches(note).count(), 1, "{line}: {}", done.stderr);

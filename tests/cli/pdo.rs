@@ -217,7 +217,7 @@ fn a_rejected_write_is_named_and_the_old_mapping_is_restored() {
 fn wrong_requests_are_rejected_before_the_first_write() {
     let bench = Bench::of(ALL);
     let refuses = |line: &str, message: &str| bench.run(line).refuses(message);
-    refuses("pdo map 1 1", "nothing to set: name signals, or use --transmission, --event-timer, --inhibit or --cob-id");
+    refuses("pdo map 1 1", "nothing to set: add signals, or use --transmission, --event-timer, --inhibit or --cob-id");
     refuses("pdo map 1 1 0x1:1/64 0x2:1/8", "node 1: the mapping has 9 bytes; a PDO has at most 8 bytes");
     refuses("pdo map 1 1 pressure/65", "\"pressure/65\": \"65\" is not a number of bits (1 to 64)");
     refuses(

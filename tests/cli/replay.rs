@@ -131,7 +131,7 @@ fn decimal_digits_are_learned_per_channel() {
         replay(&bench, "t.log", "log 5")
     };
     let said = log(&objects).exit(2).stderr;
-    assert!(said.contains("it sends TPDOs, and their mapping is unknown"), "{said}");
+    assert!(said.contains("the mapping of its TPDOs is unknown"), "{said}");
     objects.push((0x6132, 2, Some(1)));
     let done = log(&objects).exit(0);
     let rows: Vec<&str> = done.stdout.lines().skip(1).map(|row| row.splitn(4, ',').last().unwrap_or(row)).collect();
@@ -434,7 +434,7 @@ fn pdo_watch_and_check_read_the_mapping_from_the_recording() {
     let values: String = recording(log_form).lines().skip(13).map(|line| format!("{line}\n")).collect();
     fs::write(bench.path("t.log"), values).expect("written");
     let done = replay(&bench, "t.log", "pdo watch 5").exit(2);
-    assert!(done.stderr.contains("node 5: it sends TPDOs, and their mapping is unknown"), "{}", done.stderr);
+    assert!(done.stderr.contains("node 5: the mapping of its TPDOs is unknown"), "{}", done.stderr);
     fs::write(bench.path("t.log"), "(1700000000.0) can0 705#05\n").expect("written");
     assert_eq!(replay(&bench, "t.log", "pdo watch 5").exit(3).stderr, "cangauge: no TPDO was received\n");
 }

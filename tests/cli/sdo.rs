@@ -89,7 +89,7 @@ fn value_is_written_with_the_width_of_its_type() {
 fn acknowledged_value_that_is_not_kept_is_exit_6() {
     // HYDAC: a COB-ID of 0 sets the default.
     let bench = Bench::of("hydac@5");
-    let message = "the write of 0x1800:1 was acknowledged, but it reads 0x85010040 instead of 0x00000000";
+    let message = "the write of 0x1800:1 was acknowledged, but its value is 0x85010040 instead of 0x00000000";
     bench.run("sdo write 5 0x1800:1 0 --verify").fails(6, &format!("cangauge: node 5: {message}\n"));
 }
 
@@ -133,7 +133,7 @@ fn unknown_type_must_be_stated() {
     Bench::of("mh4@5").run("sdo write 5 0x5000 5").fails(
         2,
         "cangauge: node 5: write 0x5000:0: its type is unknown\n\
-         hint: state it: cangauge sdo write 5 0x5000:0 VALUE --type u32 (or i16, r32, vs)\n",
+         hint: add the type: cangauge sdo write 5 0x5000:0 VALUE --type u32 (or i16, r32, vs)\n",
     );
 }
 
@@ -225,7 +225,7 @@ fn another_sdo_channel_is_used_as_stated() {
         assert_eq!(done.frames_of("605"), [""; 0]);
     }
     bench.run("sdo read 5 0x1000 --sdo 6=0x645:0x5C5").exit(0);
-    bench.run("scan --sdo 0x645:0x5C5").refuses("--sdo does not say for which node");
+    bench.run("scan --sdo 0x645:0x5C5").refuses("the node of --sdo is missing");
     bench.run("sdo read 5 0x1000 --sdo 0x645:0x645").exit(2);
     bench.run("sdo read 5 0x1000 --sdo 0x000:0x585").exit(2);
 }
@@ -236,7 +236,7 @@ fn stopped_node_is_named_in_the_error() {
         "[[device]]\nkind = \"mh4\"\nnode = 5\nstart = true\nset = { \"0x1017\" = 100 }\nanswers_only = [\"0x1001\"]\n",
     );
     let done = bench.run("sdo read 5 0x1000").exit(3);
-    assert!(done.stderr.contains("; its heartbeat says operational"), "{}", done.stderr);
+    assert!(done.stderr.contains("; its heartbeat shows operational"), "{}", done.stderr);
     let done = bench.run("sdo read 5 0x1001 0x1000").exit(3);
     assert!(done.stderr.contains("hint: the node answered before: allow it more time with -t 2s"), "{}", done.stderr);
 }

@@ -257,7 +257,7 @@ fn a_unit_that_the_device_does_not_accept_is_rejected_with_the_list() {
         "cangauge: node 127: pressure accepts psi, bar, kPa, not 0x0000AB00\n\
          hint: 0x0000AB00 is psi in wire order: use 0x00AB0000\n"
     );
-    bench.run("unit 3 ch4 K").fails(2, "cangauge: node 3: ch4 is in degC, and the device cannot change it\n");
+    bench.run("unit 3 ch4 K").fails(2, "cangauge: node 3: ch4 is in degC, which the device cannot change\n");
     bench.run("unit 5 pressure furlong").exit(2);
     bench.run("unit 5 pressure bar psi").exit(2);
     let done = bench.run("unit 127 psi").exit(0);
@@ -458,7 +458,7 @@ fn a_rejected_limit_restores_the_limits_before_it() {
     let done = bench.run("limits 5 pressure --lower 6 --upper 14").exit(4);
     assert_eq!(
         done.stderr,
-        "cangauge: node 5: write 0x6134:1: refused by the device (0x06090031, value too high); the previous limits are set again\n\
+        "cangauge: node 5: write 0x6134:1: refused by the device (0x06090031, value too high); the previous limits were restored\n\
          hint: show the limits: cangauge limits 5 pressure\n"
     );
     let writes: Vec<&str> = done.frames_of("605").into_iter().filter(|frame| frame.starts_with("23")).collect();

@@ -79,7 +79,7 @@ impl Mute {
             Mute::Emergency => "it is pre-operational again after the start, emergency FF00h",
             Mute::Dies => "its heartbeat stopped",
             Mute::DiesUnseen => "it does not answer: it is stopped, or has no power or cable",
-            Mute::NothingMapped => "nothing is mapped into TPDO1 (1A00h:0 is 0)",
+            Mute::NothingMapped => "nothing is mapped to TPDO1 (1A00h:0 is 0)",
             Mute::Multiplexed => "is a multiplexed PDO (1A00h:0 is FEh)",
             Mute::NotSent => "is due ",
         }

@@ -245,18 +245,18 @@ fn acknowledged_write_is_read_back() {
     };
     assert_eq!(
         rejected(|master, device| unit::set(master, device, None, PSI).map(|_| ())),
-        "node 5: the write of 0x6131:1 was acknowledged, but it reads 5111808 instead of 11206656"
+        "node 5: the write of 0x6131:1 was acknowledged, but its value is 5111808 instead of 11206656"
     );
     assert_eq!(
         rejected(|master, device| {
             let wanted = FilterRequest { kind: Some(FilterType::Moving), ..FilterRequest::default() };
             filter::set(master, device, None, wanted).map(|_| ())
         }),
-        "node 5: the write of 0x61A0:1 was acknowledged, but it reads 0 instead of 1"
+        "node 5: the write of 0x61A0:1 was acknowledged, but its value is 0 instead of 1"
     );
     assert_eq!(
         rejected(|master, device| limits::set(master, device, "ch1", &[(Limit::Delta, 0.5)]).map(|_| ())),
-        "node 5: the write of 0x6133:1 was acknowledged, but it reads 0 instead of 0.5; the previous limits are set again"
+        "node 5: the write of 0x6133:1 was acknowledged, but its value is 0 instead of 0.5; the previous limits were restored"
     );
     assert_eq!(
         rejected(|master, device| errors::clear(master, device).map(|_| ())),

@@ -204,7 +204,7 @@ fn each_cause_has_its_reason() {
         (
             "nothing mapped",
             Case::mh4("\"0x1A00:0\" = 0, \"0x1801:1\" = 0xC0000285"),
-            "nothing is mapped into TPDO1 (1A00h:0 is 0)",
+            "nothing is mapped to TPDO1 (1A00h:0 is 0)",
         ),
         (
             "multiplexed PDO, destination mode",
@@ -224,17 +224,17 @@ fn each_cause_has_its_reason() {
         (
             "no trigger",
             Case::mh4(event),
-            "no event timer sends TPDO1 (1800h:2 and :5), and delta and limits are 0 (0x6133:1 to 0x6135:1)",
+            "TPDO1 has no event timer (1800h:2 and :5), and delta and limits are 0 (0x6133:1 to 0x6135:1)",
         ),
         (
             "steady value",
             Case::mh4(&format!("{event}, {ALIVE}, \"0x6133:1\" = 1000.0")),
-            "no event timer sends TPDO1 (1800h:2 and :5): its value does not change enough",
+            "TPDO1 has no event timer (1800h:2 and :5), and its value does not change enough",
         ),
         (
             "event timer of another transmission type",
             Case::mh4(&format!("{event}, {ALIVE}, \"0x1800:5\" = 100, \"0x6133:1\" = 1000.0")),
-            "no event timer sends TPDO1 (1800h:2 and :5): its value does not change enough",
+            "TPDO1 has no event timer (1800h:2 and :5), and its value does not change enough",
         ),
         (
             "steady value or not operational",
@@ -286,7 +286,7 @@ fn each_cause_has_its_reason() {
         (
             "wrong length",
             Case::mh4("").hears(&[(1000, "185#0102"), (2000, "185#0102")]),
-            "its TPDOs have 2 bytes, their mapping 5",
+            "its TPDOs have 2 bytes, but their mapping has 5",
         ),
         (
             "another node has the COB-ID",
@@ -346,7 +346,7 @@ fn signal_without_values_has_its_reason_after_five_seconds_and_at_the_end() {
         Case { seconds: Some(7), ..Case::mh4("\"0x1801:2\" = 255, \"0x6134:2\" = 0.0, \"0x6135:2\" = 0.0").sync(100) };
     let (result, kept) = case.run();
     let report = result.expect("a recording");
-    let reason = "node 5: no measurements of temperature: no event timer sends TPDO2 (1801h:2 and :5), and delta and \
+    let reason = "node 5: no measurements of temperature: TPDO2 has no event timer (1801h:2 and :5), and delta and \
                   limits are 0 (0x6133:2 to 0x6135:2)";
     assert!(report.rows > 0 && report.nothing.is_none());
     assert_eq!(remarks(&kept), [reason]);

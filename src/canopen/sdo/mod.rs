@@ -65,7 +65,7 @@ pub enum TransferError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Violation {
     /// Command specifier 60h, the acknowledgement of a download, in answer to an upload.
-    #[error("acknowledge of a write (60h) in answer to a read")]
+    #[error("acknowledgement of a write (60h) in answer to a read")]
     WriteAcknowledgeToRead,
     /// The command specifier does not answer this request.
     #[error("unexpected command specifier")]
@@ -83,7 +83,7 @@ pub enum Violation {
     #[error("invalid block size")]
     BlockSize,
     /// An acknowledgement of segments that were not sent.
-    #[error("acknowledge of segments that were not sent")]
+    #[error("acknowledgement of segments that were not sent")]
     Sequence,
     /// Several blocks in a row without any received segment.
     #[error("no segment was received")]

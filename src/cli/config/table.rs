@@ -56,10 +56,12 @@ pub(super) fn read(table: &Path, file: &str, with_address: bool) -> anyhow::Resu
         };
         let identity = [number("vendor")?, number("product")?, number("serial")?];
         if identity[2] == 0 {
-            return Err(wrong(line, "serial: devices with the serial number 0 cannot be told apart".to_owned()).into());
+            return Err(
+                wrong(line, "serial: devices with the serial number 0 cannot be distinguished".to_owned()).into()
+            );
         }
         if rows.iter().any(|row| row.identity == identity) {
-            return Err(wrong(line, format!("the device with the serial number {} is there twice", identity[2])).into());
+            return Err(wrong(line, format!("the device with the serial number {} occurs twice", identity[2])).into());
         }
         let label = format!("{file} (row {line} of {name})");
         let mut document =

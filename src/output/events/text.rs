@@ -138,10 +138,10 @@ pub fn remark_text(remark: &Remark) -> String {
     match remark {
         Remark::NoRequestedSignal(node) => format!("node {node} has none of the requested signals"),
         Remark::SharedCobId(id, [one, other]) => {
-            format!("nodes {one} and {other} both send TPDOs with COB-ID {id}: these TPDOs make no rows")
+            format!("nodes {one} and {other} both send TPDOs with COB-ID {id}: these TPDOs are ignored")
         }
         Remark::FreshnessNotProven => {
-            "values were sent on remote request: that each one is new is not proven (--poll reads new ones)".to_owned()
+            "values were sent on remote request and may be old (--poll reads new values)".to_owned()
         }
         Remark::RepeatedTpdo(node, number) => {
             format!("node {node}: {number} arrives twice at a SYNC: two devices send it, or a bridge repeats frames")
@@ -152,7 +152,7 @@ pub fn remark_text(remark: &Remark) -> String {
             let before = format_duration(*before);
             format!("node {node} changed while frames were lost: its rows of the {before} before may be wrong")
         }
-        Remark::NotReadAgain(node) => format!("node {node} could not be read again: its later frames made no rows"),
+        Remark::NotReadAgain(node) => format!("node {node} could not be read again: its later frames were ignored"),
         Remark::LeftOperational(nodes) => match nodes.as_slice() {
             [node] => format!("node {node} was started; its previous state is unknown, so it stays operational"),
             nodes => format!(

@@ -16,7 +16,7 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
         AutozeroFailure::NoAutozero { title } => Words::new(format!("{title} has no autozero")),
         AutozeroFailure::NoSuchChannel { title, channel, available } => {
             Words::new(format!("{title} has no autozero of channel {channel}"))
-                .hint(format!("it has one of: {}", list(available)))
+                .hint(format!("use one of: {}", list(available)))
         }
         AutozeroFailure::WhichChannel { target, available } if available.is_empty() => {
             Words::new("the device has several channels: choose one")
@@ -24,11 +24,10 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
         }
         AutozeroFailure::NoTare => {
             Words::new("no description or EDS of it has a tare (0x6139) and a net value (0x6140)")
-                .hint("use one that has: --device FILE or --eds FILE")
+                .hint("use a description with both: --device FILE or --eds FILE")
         }
         AutozeroFailure::NoTareOfChannel { channel, available } => {
-            Words::new(format!("it has no tare of channel {channel}"))
-                .hint(format!("it has one of: {}", list(available)))
+            Words::new(format!("it has no tare of channel {channel}")).hint(format!("use one of: {}", list(available)))
         }
         AutozeroFailure::NoTareZero { channel } => {
             Words::new(format!("it has no tare zero (0x6138:{channel}) that can be written"))
@@ -124,7 +123,7 @@ fn remedy(target: ZeroTarget, objection: &Objection, node: &str, choice: &str) -
     match objection {
         Objection::Absolute => "apply a vacuum and use --force".to_owned(),
         Objection::Invalid { .. } => format!("show the errors of the device: cangauge errors {node}"),
-        Objection::RangeUnknown { .. } => "state the largest reading to accept as zero: --limit VALUE".to_owned(),
+        Objection::RangeUnknown { .. } => "add the largest reading to accept as zero: --limit VALUE".to_owned(),
         Objection::TooFar { enough, .. } => {
             format!(
                 "vent or isolate the line; if the limit is too low: cangauge autozero {node}{choice} --limit {enough}"
@@ -163,7 +162,7 @@ pub(in crate::output) fn effect(node: &str, effect: &AutozeroEffect) -> NoteText
             look(NoteText::new("no-change-seen", text), &offset.map(|object| object.to_string()), signal)
         }
         AutozeroEffect::Moved(Some(shift)) => {
-            NoteText::new("zero-moved", format!("the zero was moved by {}", quantity(*shift)))
+            NoteText::new("zero-moved", format!("the zero was shifted by {}", quantity(*shift)))
         }
         AutozeroEffect::Moved(None) => NoteText::new("zero-moved", "the zero was set"),
         AutozeroEffect::Stored => NoteText::new("stored", "the zero was stored"),

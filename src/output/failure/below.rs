@@ -108,7 +108,7 @@ pub(super) fn sdo(error: &SdoError) -> Words {
         }
         SdoFailure::Refused(code) if error.operation == Operation::Write && error.object.index == 0x1010 => {
             match code.0 {
-                0x0606_0000 => words.hint("its non-volatile memory fails: it may be worn out"),
+                0x0606_0000 => words.hint("its non-volatile memory may be worn out"),
                 0x0800_0021 | 0x0800_0022 => {
                     words.hint(format!("leave OPERATIONAL first: cangauge nmt preop {}", error.node))
                 }
@@ -148,19 +148,18 @@ pub fn second_answer(node: NodeId, answers: SecondAnswer) -> String {
 fn silence_advice(node: NodeId, waited: Duration, started: bool, missed: MissedAnswer) -> Option<String> {
     if let Some(frame) = missed.frame {
         let channel = frame.id().sdo_response_node();
-        return (channel.is_none()).then(|| {
-            format!("if it answers with another COB-ID, state the channel: --sdo {node}=0xTX:0x{}", frame.id())
-        });
+        return (channel.is_none())
+            .then(|| format!("if it answers with another COB-ID, add: --sdo {node}=0xTX:0x{}", frame.id()));
     }
     Some(match missed.state {
-        Some(NmtState::Stopped) => format!("a stopped node answers no SDO: cangauge nmt preop {node}"),
+        Some(NmtState::Stopped) => format!("a stopped node does not answer SDO:  cangauge nmt preop {node}"),
         _ if missed.has_answered || started => {
             format!(
                 "the node answered before: allow it more time with -t {}",
                 format_duration(waited * 4).replace(' ', "")
             )
         }
-        Some(_) => "if its SDO channel is another one, state it: --sdo 0xTX:0xRX".to_owned(),
+        Some(_) => "if its SDO channel has other COB-IDs, add: --sdo 0xTX:0xRX".to_owned(),
         None => check_node(Some(node)),
     })
 }
@@ -201,7 +200,7 @@ pub(super) fn is_addressing(service: Service) -> bool {
 fn refusal_hint(service: Service) -> Option<&'static str> {
     match service {
         Service::ConfigureBitTiming => {
-            Some("find the device's own table of bit rates in its manual, then use --table-index N")
+            Some("find the bit rate table of the device in its manual, then use --table-index N")
         }
         Service::Store => Some("some devices store it through objects: --via sdo"),
         _ => None,
@@ -211,10 +210,11 @@ fn refusal_hint(service: Service) -> Option<&'static str> {
 fn silence_hint(service: Service) -> Option<&'static str> {
     match service {
         Service::SwitchSelective => Some(
-            "no slave has this address, or it accepts no LSS in its present state: list the slaves with \
-             cangauge lss scan, or stop the node first: cangauge nmt stop NODE",
+            "no slave has this address, or it does not accept LSS in its NMT state: cangauge lss scan, or stop the node first: cangauge nmt stop NODE",
         ),
-        Service::Store => Some("it is unknown whether the device stored: power it off and on, then read it again"),
+        Service::Store => {
+            Some("it is unknown whether the values are stored: power the device off and on, then read it again")
+        }
         Service::Inquire(_) | Service::InquireNodeId => {
             Some("not every device has this service; read its identity by SDO: cangauge scan")
         }

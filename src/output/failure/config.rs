@@ -70,8 +70,8 @@ fn of_problem(problem: &Problem) -> Words {
         Problem::Type { expected, found } => format!("{found} instead of {expected}"),
         Problem::NotADuration { text } if text.parse::<f64>().is_ok() => format!("\"{text}\" has no unit (100ms, 1s)"),
         Problem::NotADuration { text } => format!("\"{text}\" is not a duration (100ms, 1s)"),
-        Problem::DurationStep { tick: 1000 } => "the device counts in whole milliseconds".to_owned(),
-        Problem::DurationStep { tick } => format!("the device counts in steps of {tick}us"),
+        Problem::DurationStep { tick: 1000 } => "the device needs a multiple of 1ms".to_owned(),
+        Problem::DurationStep { tick } => format!("the device needs a multiple of {tick}us"),
         Problem::UnknownUnit { text } => format!("\"{text}\" is not a known unit (bar, kPa, degC)"),
         Problem::NotAQuantity { text } => format!("\"{text}\" is not a number with a unit (\"3.2 bar\")"),
         Problem::NoUnit => {
@@ -92,7 +92,7 @@ fn of_problem(problem: &Problem) -> Words {
         }
         Problem::NotACobId { text } => format!("\"{text}\" is not an 11-bit identifier (0x1A5) or \"default\""),
         Problem::Restricted { id } => format!("CiA 301 reserves the identifier 0x{id:X} for other services"),
-        Problem::SameId { id, other } => format!("{other} uses the identifier 0x{id:X} too"),
+        Problem::SameId { id, other } => format!("{other} also uses the identifier 0x{id:X}"),
         Problem::NoId => "a TPDO that is on needs an identifier: add its cob-id to [address]".to_owned(),
         Problem::NotABitRate { text } => format!("\"{text}\" is not a bit rate (250k, 1M)"),
         Problem::Bits { bits } => format!("{bits} bits: a TPDO has at most 64"),

@@ -8,7 +8,7 @@ pub(super) fn words(cause: &DetectFailure) -> Words {
     match cause {
         DetectFailure::NotFound { interface, detection, active } => {
             let has_errors = detection.tried.iter().any(|tried| tried.errors > 0);
-            let ask = format!("on a bench with one device only: cangauge bus detect {interface} --active");
+            let ask = format!("only with a single device: cangauge bus detect {interface} --active");
             let (message, hint) = match (active, has_errors) {
                 (false, true) => (
                     "errors but no valid frame at any bit rate",
@@ -26,7 +26,7 @@ pub(super) fn words(cause: &DetectFailure) -> Words {
             Words::new(format!("{interface}: {message}")).hint(hint)
         }
         DetectFailure::NotRestored { interface, found, error } => {
-            let restored = format!("{interface} was not set back to its previous bit rate: {error}");
+            let restored = format!("{interface} was not restored to its previous bit rate: {error}");
             match found {
                 Some(bit_rate) => Words::new(format!("the bus runs at {bit_rate} bit/s, but {restored}")),
                 None => Words::new(restored),

@@ -21,7 +21,7 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         LogFailure::NotMapped { name, disabled } => {
             let words = match disabled {
                 Some((node, number)) => format!(
-                    "{number} of node {node} contains {name}, and is disabled (bit 31 of {:04X}h:1)",
+                    "{number} of node {node} contains {name}, but is disabled (bit 31 of {:04X}h:1)",
                     number.communication(1).index
                 ),
                 None => format!("no TPDO contains {name}"),
@@ -39,14 +39,14 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
                 .hint("set 1019h to the same value in all nodes, or record them one by one")
         }
         LogFailure::SecondSyncProducer => Words::new("another node sends SYNC on this bus: nothing was started")
-            .hint("omit --sync: the nodes send on the SYNC that is already there"),
+            .hint("omit --sync: the other node already sends SYNC"),
         LogFailure::NoRtr { number } => no_rtr(*number),
         LogFailure::TwoSenders(number) => {
             Words::new(two_senders(*number)).hint("disconnect one of them, or change its node-ID: cangauge lss scan")
         }
         LogFailure::UnknownMapping => {
             let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
-            Words::new("it sends TPDOs, and their mapping is unknown").hint(format!(
+            Words::new("the mapping of its TPDOs is unknown").hint(format!(
                 "name the device: --device {node}=mh4 (or a file), or start recording before another master reads it"
             ))
         }
@@ -126,7 +126,7 @@ fn nothing_received(
     let words = Words::new(format!("no measurements within {within}: no TPDO received{states}"));
     // The nodes are already started, so they wait for another trigger.
     if nodes.iter().all(|(_, state)| *state == Some(NmtState::Operational)) {
-        return words.hint("--passive cannot ask the nodes for the reason: omit it");
+        return words.hint("--passive cannot read the reason from the nodes: omit it");
     }
     words.hint(format!("--passive starts no node: omit it, or: cangauge nmt start {node}"))
 }

@@ -37,11 +37,11 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
             .hint(below::check_node(cause.device.node)),
         LssCause::OtherNodeIdByLss(found) => other_node_id(*found),
         LssCause::SameIdentity(other) => Words::new(format!("node {other} has the same identity")).hint(CONNECT_ALONE),
-        LssCause::SeveralWithIdentity => Words::new("more than one device answers to its identity").hint(CONNECT_ALONE),
+        LssCause::SeveralWithIdentity => Words::new("more than one device has this identity").hint(CONNECT_ALONE),
         LssCause::NotTheOnly(sign) => {
             let names = cause.device.node.map_or_else(|| "node-ID".to_owned(), |node| format!("node-ID ({node})"));
             Words::new(another(sign))
-                .hint(format!("name one device by its {names} or its identity; list them: cangauge lss scan"))
+                .hint(format!("use the {names} or the identity of one device; list them:  cangauge lss scan"))
         }
         LssCause::NoDevice => Words::new("no device answers by SDO or LSS")
             .hint("check power, wiring and bit rate; find the cause: cangauge doctor all"),
@@ -88,8 +88,8 @@ fn duplicate_node_id(sign: DuplicateSign) -> Words {
     let words = duplicate(sign);
     match sign {
         DuplicateSign::OtherMaster => Words::new(words).hint("stop the other program, or try again"),
-        _ => Words::new(format!("{words}: it seems that several devices have this node-ID")).hint(
-            "connect one device at a time, or name one by the identity on its label: \
+        _ => Words::new(format!("{words}: several devices probably have this node-ID")).hint(
+            "connect one device at a time, or use the identity on its label:  \
              cangauge lss set-id VENDOR:PRODUCT:REVISION:SERIAL NEW",
         ),
     }
@@ -112,7 +112,7 @@ fn objects(cause: &LssCause) -> Words {
     const BY_LSS: &str = "use LSS: --via lss";
     match cause {
         LssCause::ObjectsUnknown => Words::new("the objects that set its node-ID and bit rate are unknown")
-            .hint("use LSS: --via lss; or name a description: --device NAME"),
+            .hint("use LSS: --via lss; or choose a description: --device NAME"),
         LssCause::ObjectsOutOfReach => Words::new("SDO does not reach it, or another device has the same node-ID")
             .hint(format!("{CONNECT_ALONE}, or {BY_LSS}")),
         LssCause::NoObject(setting) => {
@@ -163,7 +163,7 @@ fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
     match cause {
         LssCause::NotReset(new, why) => {
             let why = match why {
-                NotReset::SharedNodeId(node) => format!("another device has node-ID {node} too"),
+                NotReset::SharedNodeId(node) => format!("another device also has node-ID {node}"),
                 NotReset::NodeIdUnknown => "its present node-ID is unknown".to_owned(),
             };
             Words::new(format!("not reset, because {why}: node-ID {new} is not confirmed"))
@@ -179,10 +179,10 @@ fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
             Words::new(format!("{}: several devices have this node-ID", duplicate(*sign)))
         }
         LssCause::SilentAfterBootUp(waited) => {
-            Words::new(format!("boot-up seen, then no answer within {}", format_duration(*waited)))
+            Words::new(format!("boot-up received, then no answer within {}", format_duration(*waited)))
         }
         LssCause::StillOldNodeId { old, new } => {
-            Words::new(format!("it was reset and still has node-ID {old}, not {new}"))
+            Words::new(format!("it was reset but still has node-ID {old}, not {new}"))
         }
         LssCause::NotSeen { new, waited } => {
             let words =

@@ -19,7 +19,7 @@ pub(super) fn words(failure: &Failure, cause: &NmtFailure) -> Words {
         NmtFailure::Absent => Words::new("no heartbeat and no SDO answer").hint(below::check_node(failure.node)),
         NmtFailure::NotRecorded(error) => {
             Words::new(format!("write the journal {}: {}; nothing was changed", error.file, error.reason))
-                .hint("name a folder that can be written: XDG_STATE_HOME=/tmp/state cangauge …")
+                .hint("choose a writable folder: XDG_STATE_HOME=/tmp/state cangauge …")
         }
         NmtFailure::NoStartupObject => Words::new("the object that decides how this device starts is unknown")
             .hint(format!("many devices have 1F80h; read it: cangauge sdo read {node} 0x1F80")),

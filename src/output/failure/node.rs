@@ -15,14 +15,14 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
         Error::Sdo(error) | Error::Unknown(error) => below::sdo(error),
         Error::NotKept { object, written, found, .. } => {
             let (found, written) = (shown(found), shown(written));
-            Words::new(format!("the write of {object} was acknowledged, but it reads {found} instead of {written}"))
+            Words::new(format!("the write of {object} was acknowledged, but its value is {found} instead of {written}"))
         }
         Error::Width { object, width, given, .. } => Words::new(format!(
             "write {object}: the object has {width} bytes, the value {given}, and the device accepts no size"
         )),
         Error::Value { object, error, .. } => Words::new(format!("write {object}: {error}")),
         Error::TypeUnknown { node, object } => Words::new(format!("write {object}: its type is unknown"))
-            .hint(format!("state it: cangauge sdo write {node} {object} VALUE --type u32 (or i16, r32, vs)")),
+            .hint(format!("add the type: cangauge sdo write {node} {object} VALUE --type u32 (or i16, r32, vs)")),
         Error::Name(error) => {
             let source = error.title.as_deref().unwrap_or("the standard");
             let words = Words::new(format!("{source} has no object \"{}\"", error.name));

@@ -134,7 +134,7 @@ fn step(error: &StepError, write: Option<&StepWrite>) -> String {
         StepError::Interrupted => at.map_or_else(|| "interrupted".to_owned(), |at| format!("interrupted at {at}")),
         StepError::Bus(error) => at.map_or_else(|| error.to_string(), |at| format!("{error} at {at}")),
         StepError::NotKept { object, found, written } => {
-            format!("the write of {object} was acknowledged, but it reads {found:#X} instead of {written:#X}")
+            format!("the write of {object} was acknowledged, but its value is {found:#X} instead of {written:#X}")
         }
     }
 }

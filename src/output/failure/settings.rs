@@ -11,7 +11,7 @@ use crate::tasks::settings::{QuantityError, SettingsEffect, SettingsFact, Settin
 pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> Words {
     match cause {
         SettingsFailure::WhichSignal { available } => {
-            Words::new(format!("name a signal (it has: {})", available.join(", ")))
+            Words::new(format!("choose a signal (it has:  {})", available.join(", ")))
         }
         SettingsFailure::NoErrorObjects => {
             Words::new("it has neither an error register (1001h) nor an error history (1003h)")
@@ -21,11 +21,11 @@ pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> Words {
             Words::new(format!("it acknowledged the write of 0x1003:0, but the history still has {}", errors(*count)))
         }
         SettingsFailure::NoChannel { signal } => {
-            Words::new(format!("{signal} is no channel of CiA 404: it has no settings of a channel"))
+            Words::new(format!("{signal} is not a CiA 404 channel: it has no such setting"))
         }
         SettingsFailure::NoUnit { signal } => Words::new(format!("{} has no unit (6131h)", of(signal.as_ref()))),
         SettingsFailure::UnitFixed { signal, unit } => {
-            Words::new(format!("{signal} is in {unit}, and the device cannot change it"))
+            Words::new(format!("{signal} is in {unit}, which the device cannot change"))
         }
         SettingsFailure::UnitNotAccepted { signal, unit, accepted } => unit_not_accepted(signal, *unit, accepted),
         SettingsFailure::NoMinMax => Words::new("no object with minimum and maximum is known for this device"),
@@ -124,9 +124,9 @@ fn of_filter(cause: &SettingsFailure) -> Words {
 /// The text for an effect.
 pub(in crate::output) fn effect(node: &str, effect: &SettingsEffect) -> NoteText {
     let (code, message, signal) = match effect {
-        SettingsEffect::LimitsRestored { signal } => ("limits-restored", "the previous limits are set again", signal),
+        SettingsEffect::LimitsRestored { signal } => ("limits-restored", "the previous limits were restored", signal),
         SettingsEffect::LimitsNotRestored { signal } => {
-            ("limits-not-restored", "not all previous limits could be set again", signal)
+            ("limits-not-restored", "not all previous limits could be restored", signal)
         }
         SettingsEffect::LimitsUnknown { signal } => ("limits-unknown", "the present limits are unknown", signal),
     };

@@ -72,7 +72,7 @@ pub(in crate::output) fn effect(node: &str, effect: &StoreEffect) -> NoteText {
             NoteText::new("signature-sent", message).command("repeat and verify", command)
         }
         StoreEffect::Answers(true) => NoteText::new("answers", "the device answers other requests"),
-        StoreEffect::Answers(false) => NoteText::new("no-answer", "the device does not answer any more"),
+        StoreEffect::Answers(false) => NoteText::new("no-answer", "the device no longer answers"),
         StoreEffect::Stored(groups) => NoteText::new("stored", format!("stored: {}", Group::names(groups))),
         StoreEffect::NotVerified(verb) => NoteText::new(
             "not-verified",

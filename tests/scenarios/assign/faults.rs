@@ -176,7 +176,7 @@ fn rejected_bit_rate_changes_nothing() {
     let done = run(&mut bus, "5", &wanted);
     assert_eq!(done.failure().0, Kind::Refused);
     assert!(
-        done.failure().1.contains("nothing was changed") || done.failure().1.contains("set back"),
+        done.failure().1.contains("nothing was changed") || done.failure().1.contains("restored"),
         "{}",
         done.failure().1
     );

@@ -201,7 +201,7 @@ fn one_of_two_with_one_node_id_is_not_reset() {
     let mut expected = all_snapshots(&bus);
     let done = run(&mut bus, "0x47:1:1:200", &id(12));
     assert_eq!(done.failure().0, Kind::Unexpected);
-    assert!(done.failure().1.contains("another device has node-ID 5 too"), "{}", done.failure().1);
+    assert!(done.failure().1.contains("another device also has node-ID 5"), "{}", done.failure().1);
     assert!(done.warns("it is not reset"), "{:?}", done.notes);
     // A reset would restart the other device as well.
     expected[1].2 = Some(12);
