@@ -1,4 +1,4 @@
-//! Lists the folders of data files, so that a device or a simulator model is one file that no list names.
+//! Lists the folders of data files, so that a new device or simulator model needs no entry in a list.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -32,7 +32,7 @@ pub struct FaultPlan {
     pub restart_after: Option<Duration>,
 }
 
-/// How many frames can wait in a controller that is bus-off.
+/// The number of frames that can wait in a controller that is bus-off.
 const BUS_OFF_QUEUE_LENGTH: usize = 10;
 
 /// A bus that follows a [`FaultPlan`].

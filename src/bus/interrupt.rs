@@ -14,7 +14,7 @@ const A_CENTURY: Duration = Duration::from_secs(100 * 365 * 24 * 3600);
 /// Receives the signals SIGINT and SIGTERM.
 ///
 /// Each instance receives each signal that arrives during its lifetime, so two buses in one process both receive it.
-/// From the first instance on, Ctrl-C no longer ends the program by itself: the owner of an instance must check for it.
+/// From the first instance on, Ctrl-C no longer ends the program. The owner of an instance must check for it.
 #[derive(Debug)]
 pub struct Interrupts {
     /// Set after the byte is written to the pipe, so that a busy reader needs only one load.

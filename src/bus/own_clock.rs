@@ -16,7 +16,7 @@ const LATENCY: Duration = Duration::from_millis(50);
 ///
 /// The kernel receives a frame only after the interface. So the smallest difference between the two times is the offset
 /// of the clocks. The offset may grow only as fast as the clocks can drift. The result is never later than the time of
-/// the kernel, never earlier by more than [`LATENCY`], and never goes backwards.
+/// the kernel, and at most [`LATENCY`] earlier. It never goes backwards.
 #[derive(Debug, Default)]
 pub(super) struct OwnClock {
     /// The last reading, and the offset of the host clock from it, in nanoseconds.

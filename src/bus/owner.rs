@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io;
 
-/// Whether a file that the user did not name may be read: it belongs to root, or this process does not run as root.
+/// Whether a file that the user did not name may be read. A process that runs as root reads only files of root.
 ///
 /// # Errors
 /// The owner of the file is unknown.

@@ -196,7 +196,7 @@ mod tests {
         assert_eq!(CanId::heartbeat(dps).heartbeat_node(), Some(dps));
         assert_eq!(CanId::Standard(0x700).heartbeat_node(), None);
         assert_eq!(CanId::Extended(0x77f).heartbeat_node(), None);
-        // DPS manual, Table 8 prints 7FFh as heartbeat; that is no heartbeat of any node.
+        // Table 8 of the DPS manual contains 7FFh as heartbeat, but no node has this COB-ID.
         assert_eq!(CanId::Standard(0x7ff).heartbeat_node(), None);
     }
 

@@ -124,8 +124,8 @@ impl Life {
     /// Parses a heartbeat, boot-up message or node guarding answer. `None` for any other frame, including remote
     /// frames (guarding requests).
     ///
-    /// Some devices send more than one byte; only the first is used. A frame of 0 bytes on 700h + node-ID is ignored:
-    /// it is usually a guarding request whose RTR bit was lost. A frame of 0 bytes on 080h + node-ID is the boot-up
+    /// Some devices send more than one byte; only the first is used. A frame of 0 bytes on 700h + node-ID is ignored.
+    /// It is usually a guarding request whose RTR bit was lost. A frame of 0 bytes on 080h + node-ID is the boot-up
     /// message of devices older than CiA 301 version 4.
     pub fn parse(frame: &Frame) -> Option<(NodeId, Life)> {
         if let (Some(node), []) = (frame.id().emergency_node(), frame.data()) {

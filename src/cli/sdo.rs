@@ -295,7 +295,7 @@ impl WriteArgs {
                 });
             }
             let form = self.sdo_size.into();
-            // The first SDO to a node is a read, so that an unfinished transfer of another master does not disturb the
+            // The first SDO to a node is a read. An unfinished transfer of another master then does not disturb the
             // write.
             find_form(master, &mut node)?;
             let bar = TransferProgress::new(global.shows_progress());

@@ -12,8 +12,8 @@ use clap::Args;
 /// The net value is the process value minus the tare zero. The command measures, writes the signature once, and measures
 /// again. It prints the tare zero before and after, and on stderr the command to undo it. It never stores.
 ///
-/// The description (--device) or EDS (--eds) must contain 6139h and the net value (6140h, 7140h ...). Nothing is
-/// changed (exit 1) if a reading is invalid or the readings vary by more than 0.5 % of the measuring range.
+/// The description (--device) or EDS (--eds) must contain 6139h and the net value (6140h, 7140h ...). Each reading must
+/// be valid, and the readings may vary by at most 0.5 % of the measuring range. Otherwise nothing is changed (exit 1).
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge --eds scale.eds tare 5\n  cangauge --device scale.toml tare 5 --channel 2 --undo"

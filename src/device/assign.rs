@@ -1,4 +1,4 @@
-//! How a device takes a new node-ID and bit rate, and the tables of bit rate indices.
+//! How to set the node-ID and bit rate of a device, and the tables of bit rate indices.
 
 use super::description::Description;
 use crate::canopen::object::ObjectId;
@@ -49,7 +49,7 @@ impl AssignEntry {
     }
 }
 
-/// The method by which a device takes its node-ID and bit rate.
+/// The method to set node-ID and bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignKind {
     /// LSS (CiA 305).
@@ -77,7 +77,7 @@ pub enum Applies {
     Power,
 }
 
-/// An object that takes a node-ID or the index of a bit rate.
+/// An object for the node-ID or the index of the bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AssignObject {
     /// The object.

@@ -1,6 +1,6 @@
 //! Similarity of words, to suggest the name that the user may have meant.
 
-/// How many letters must be changed, added or removed to turn one word into the other (Levenshtein).
+/// The number of letters to change, add or remove, to convert one word to the other (Levenshtein).
 pub fn distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

@@ -1,7 +1,7 @@
 //! Objects that have the same type on every device (CiA 301, CiA 404).
 //!
-//! A table and not a description file, because each `sdo read` uses it: parsing a file with thousands of entries would
-//! take most of the run time.
+//! This is a table and not a description file, because each `sdo read` uses it. Parsing a file with thousands of
+//! entries would take most of the run time.
 //!
 //! Objects whose type differs between devices (6130h is INTEGER32 on the DPS) are missing: their type comes from a
 //! description.

@@ -35,8 +35,7 @@ pub(super) struct MissedAnswers {
     boot_times: BTreeMap<NodeId, Mono>,
     /// The total time of repeats after boot-up messages that got no answer.
     time_without_answer: Duration,
-    /// The object of each request that waits for the first frame of its answer, and another frame that was received
-    /// instead.
+    /// The object of each request without an answer so far, and another frame that was received instead.
     open: BTreeMap<NodeId, (ObjectId, Option<Frame>)>,
     /// Nodes whose request was repeated. Their answers may have another COB-ID.
     repeated: BTreeSet<NodeId>,

@@ -1,8 +1,8 @@
 //! Drives the protocol state machines over a [`Bus`]: one deadline per exchange, retries, matching of answers, many
 //! exchanges in parallel.
 //!
-//! [`Master::next`] is the only loop. It sends waiting frames, receives one event, passes it to the SDO client and
-//! returns what happened. All blocking functions are built on it.
+//! [`Master::next`] is the only loop. It sends waiting frames, receives one event, passes the event to the SDO client
+//! and returns the result. All blocking functions use it.
 
 mod active;
 mod foreign_traffic;

@@ -141,7 +141,7 @@ pub const NUMBER_LIMIT: usize = 16;
 /// The limit for an object that is read as text.
 pub const TEXT_LIMIT: usize = 64 * 1024;
 
-/// How many bytes an object can have, from its index (CiA 301 and the device profiles).
+/// The largest size of an object in bytes, from its index (CiA 301 and the device profiles).
 fn longest(object: ObjectId) -> usize {
     match object.index {
         // Name and versions of the manufacturer.

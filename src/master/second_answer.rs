@@ -83,8 +83,8 @@ impl Answers {
         self.finding.filter(|finding| finding.differs())
     }
 
-    /// Whether the serial number must be read before the first write: the node has not answered yet, or its answers
-    /// arrive twice. `true` only once.
+    /// Whether the serial number must be read before the first write. Needed if the node has not answered yet, or if
+    /// its answers arrive twice. `true` only once.
     pub(super) fn needs_check(&mut self) -> bool {
         let is_first = !std::mem::replace(&mut self.is_checked, true);
         is_first && (self.latest.is_none() || self.finding.is_some())
@@ -115,8 +115,8 @@ impl Answers {
         self.wait_until = Some(at + wait);
     }
 
-    /// Whether this frame only repeats the latest one. It is then a segment whose successor is expected, or an answer
-    /// to the previous request of the other kind (read or write). An abort has the same form for both kinds.
+    /// Whether this frame only repeats the latest one. It is then an earlier segment, or an answer to the previous
+    /// request of the other kind (read or write). An abort has the same form for both kinds.
     pub(super) fn is_repetition(&self, frame: &Frame, operation: Operation, is_in_segments: bool, at: Mono) -> bool {
         let is_abort = frame.data().first() == Some(&0x80);
         let is_other = !is_abort && self.initial.is_some_and(|(_, previous)| previous != operation);

@@ -10,7 +10,8 @@ use std::time::Duration;
 /// The wait before a full transmit queue is tried again. Linux does not report when the queue has space again.
 const QUEUE_RETRY_INTERVAL: Duration = Duration::from_millis(1);
 
-/// How many frames may wait in the interface. The default transmit queue of a Linux interface holds 10.
+/// The largest number of frames that may wait in the interface. The default transmit queue of a Linux interface holds
+/// 10.
 const MAX_QUEUED_FRAMES: u32 = 4;
 
 /// The longest classic frame with an 11-bit identifier, in bits: 8 data bytes, all stuff bits, intermission.
@@ -154,8 +155,7 @@ impl Outgoing {
             if let Some(ticket) = ticket {
                 sent(*ticket, now);
             }
-            // Uses the length of this frame, not that of the longest frame: otherwise a long burst would be slower than
-            // the bus.
+            // Uses the length of this frame. With the longest length, a long burst would be slower than the bus.
             if let Some(bit_rate) = bit_rate {
                 self.wire_free_at = self.wire_free_at.max(now) + frame_time(frame, bit_rate);
             }

@@ -38,8 +38,8 @@ pub enum BlockMode {
     /// bytes. For DOMAIN objects of up to [`SMALL`] bytes, the server may answer segmented. If the device rejects or
     /// ignores the block request, the transfer is segmented.
     ///
-    /// Strings and unknown types are first read segmented, because most are short and some servers react badly to an
-    /// unknown request.
+    /// Strings and unknown types are first read segmented. Most are short, and some servers react badly to an unknown
+    /// request.
     #[default]
     Auto,
     /// Always. If the device rejects it, the transfer fails.

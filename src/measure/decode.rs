@@ -169,7 +169,7 @@ impl Decoder {
         )
     }
 
-    /// The mapped and the received length in bytes of the first TPDO of a node whose length differs from its mapping.
+    /// The first TPDO of a node with a wrong length: its mapped and its received length in bytes.
     pub fn wrong_length(&self, node: NodeId) -> Option<(usize, usize)> {
         let mut of_node = self.tpdos.values().filter(|tpdo| tpdo.node == node && !tpdo.uses_longer);
         of_node.find_map(|tpdo| Some((tpdo.length, tpdo.other_length?)))

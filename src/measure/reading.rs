@@ -201,7 +201,7 @@ impl MeasuringRange {
         }
     }
 
-    /// The direction of an overload that the device reports: the nearer end of the range, else the sign of the value.
+    /// The direction of a reported overload: the nearer end of the range, else the sign of the value.
     fn nearer_end(self, value: f64) -> Status {
         let middle = if let MeasuringRange::Known(start, end) = self { f64::midpoint(start, end) } else { 0.0 };
         if value < middle { Status::OverloadLow } else { Status::OverloadHigh }

@@ -67,8 +67,8 @@ impl Node {
         self.entry(object).filter(|_| !is_open).map(|entry| entry.data_type)
     }
 
-    /// The type of an object that a setting needs: as [`Layout::data_type`], else by the first digit of the index
-    /// (CiA 404), else UNSIGNED32. Do not use it for measured values.
+    /// The type of an object for a setting: as [`Layout::data_type`], else by the index (CiA 404), else UNSIGNED32. Do
+    /// not use it for measured values.
     ///
     /// [`Layout::data_type`]: crate::measure::layout::Layout::data_type
     pub fn data_type(&self, object: ObjectId) -> DataType {
@@ -84,8 +84,7 @@ impl Node {
         ObjectId::new(signal.value_object.0.index & 0xf000 | low, signal.channel)
     }
 
-    /// The object with this name that belongs to a signal: with its channel as sub-index, or without one on a device
-    /// with a single signal.
+    /// The object with this name for a signal. The sub-index is the channel; with a single signal, it may be missing.
     pub fn object_of(&self, signal: &Signal, name: &str) -> Option<ObjectId> {
         let dictionary = &self.model.as_ref()?.dictionary;
         let numbered = dictionary.find(&format!("{name}:{}", signal.channel));
@@ -170,8 +169,8 @@ pub fn resolve(master: &mut Master<'_>, node: &mut Node, name: &str) -> Result<O
     }))
 }
 
-/// The type for writing `text` to an object: from the description or the standard, else an integer as wide as the object
-/// if the node indicates its size.
+/// The type for writing `text` to an object, from the description or the standard. Otherwise an integer as wide as the
+/// object, if the node indicates the size.
 ///
 /// # Errors
 /// [`Error::TypeUnknown`]; the node does not answer; bus errors and Ctrl-C.
@@ -203,8 +202,7 @@ pub fn encode(node: &Node, object: ObjectId, data_type: DataType, text: &str) ->
     encoded.or_else(|error| word(node, object, data_type, text).ok_or(Error::Value { node: node.id, object, error }))
 }
 
-/// The bytes for a word instead of a number: a signature, a word that the description explains, or a sensor type of CiA
-/// 404 (6110h).
+/// The bytes for a word instead of a number. The word is a signature, from the description, or a sensor type (6110h).
 pub fn word(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> Option<Vec<u8>> {
     if !matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_)) {
         return None;

@@ -21,8 +21,7 @@ pub struct Overheard {
 }
 
 impl Overheard {
-    /// Handles a frame. Returns the node and the object if the object has a new value, or if the node rejected its read
-    /// for the first time.
+    /// Handles a frame. Returns the node and the object after a new value, or after the first rejected read.
     pub fn take(&mut self, frame: &Frame) -> Option<(NodeId, ObjectId)> {
         if let Some(node) = frame.id().sdo_request_node() {
             self.request(node, frame);

@@ -90,7 +90,7 @@ fn tpdo_node(id: CanId) -> Option<NodeId> {
 
 /// Reads the device type (1000h) of every node, all in parallel.
 ///
-/// A heartbeat, a boot-up message or a late answer counts as well. Nodes without an answer are asked
+/// A heartbeat, a boot-up message or a late answer also counts. Nodes without an answer are asked
 /// `rounds` times; `timeout` is the wait after the last request. If states are unknown, waits at least 200 ms after the
 /// last requests.
 ///

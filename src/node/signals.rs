@@ -77,8 +77,8 @@ pub(crate) fn can_have_channels(node: &Node) -> bool {
     )
 }
 
-/// The measured values of the profile of a node, and for each the object that shows whether the device has it: the
-/// count of an array, else the value.
+/// The measured values of the profile of a node. With each comes the object that shows whether the device has the
+/// value: the count of an array, else the value itself.
 pub(crate) fn profile_values(node: &Node) -> impl Iterator<Item = (Measured, ObjectId)> + use<> {
     let measured = node.identity.profile().map_or(&[][..], profiles::measured);
     let shown = node.model.clone().filter(|model| !model.dictionary.is_empty());

@@ -1,4 +1,4 @@
-//! Reads what is needed to understand a device's measurements: identity, TPDOs, units, digits.
+//! Reads the facts for decoding the measurements of a device: identity, TPDOs, units, digits.
 //!
 //! Many nodes are read in parallel, in the same steps. They are read with an [`Ask`]: the master, which waits for the
 //! answers, or a [`BackgroundSurvey`], which does not wait.
@@ -27,7 +27,7 @@ const U8: DataType = DataType::Unsigned(1);
 const U16: DataType = DataType::Unsigned(2);
 const U32: DataType = DataType::Unsigned(4);
 
-/// How many TPDOs are read from a device without a description. The temperature probe of JUMO sends TPDO5.
+/// The number of TPDOs read from a device without a description. The temperature probe of JUMO sends TPDO5.
 const UNDESCRIBED_TPDOS: u16 = 8;
 
 /// The descriptions that the user named, by node.
@@ -252,7 +252,7 @@ fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
         .collect();
     let values = read_known(master, &items)?;
     let counts: Vec<u8> = values.chunks(3).map(|values| unsigned(values[2].as_ref()).unwrap_or(0)).collect();
-    // FEh and FFh stand for multiplexed PDOs (CiA 301, 7.5.2.38), which measuring devices do not send.
+    // FEh and FFh mean multiplexed PDOs (CiA 301, 7.5.2.38), which measuring devices do not send.
     let entries = |count: u8| 1..=if count > 64 { 0 } else { count };
     let items: Vec<Item> = found
         .iter()

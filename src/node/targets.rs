@@ -1,8 +1,8 @@
 //! The nodes that `all` selects.
 //!
-//! These are the nodes that a scan finds, and those with another sign of life during the scan: a heartbeat, a boot-up
-//! message, a TPDO, a late answer. Nodes that answer only some requests are included. The command must succeed with
-//! each node or report its failure: no node is omitted silently.
+//! These are the nodes that a scan finds, and those with another sign of life during the scan. Signs of life are a
+//! heartbeat, a boot-up message, a TPDO, or a late answer. Nodes that answer only some requests are included. The
+//! command must succeed with each node or report its failure: no node is omitted silently.
 
 use super::read::{Item, read_values};
 use super::scan::{self, Presence};
@@ -29,7 +29,7 @@ pub fn all(master: &mut Master<'_>, timeout: Duration, rounds: u32) -> Result<Ve
 
 /// Nodes whose only sign of life is a TPDO.
 ///
-/// Its identifier may have been given to a TPDO of another node, so the TPDOs of the nodes that answer are read first.
+/// The identifier may belong to a TPDO of another node. So the TPDOs of the answering nodes are read first.
 fn nodes_by_tpdo(master: &mut Master<'_>, presence: &Presence) -> Result<Vec<NodeId>, Error> {
     let known = presence.nodes();
     let unknown: Vec<_> = presence.tpdos.iter().filter(|(node, _)| !known.contains(node)).collect();

@@ -9,7 +9,7 @@
 //! | dropped frames, faults | given to the caller | given to the caller | given to the caller | given to the caller |
 //!
 //! A dropped frame never ends a wait: a caller that needs the frame reaches its deadline. Frames, the ends of SDO
-//! transfers, faults and drop counts are given to the caller in the order in which they were received.
+//! transfers, faults and drop counts are given to the caller in the order of reception.
 
 use crate::bus::{BusError, Mono};
 use crate::master::{Error, Happening, Master};

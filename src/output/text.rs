@@ -3,8 +3,8 @@
 use crate::bus::Stamp;
 use std::fmt::Write;
 
-/// Makes text from a device safe for a terminal: replaces control characters, invisible characters and changes of the
-/// writing direction with escapes such as `\x1B`.
+/// Makes text from a device safe for a terminal. Control characters, invisible characters and changes of the writing
+/// direction become escapes such as `\x1B`.
 pub fn safe(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for character in text.chars() {

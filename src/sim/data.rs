@@ -1,7 +1,7 @@
 //! Data that only the simulator needs: the measured quantities of a device and facts that no manual contains.
 //!
-//! Some devices have a file in `models/`. For a device without a file, moving quantities are derived from its
-//! description, so a new device needs only a description.
+//! Some devices have a file in `models/`. A device without a file has moving quantities from its description. So a new
+//! device needs only a description.
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;

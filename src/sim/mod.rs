@@ -1,7 +1,7 @@
 //! Simulated devices, built from the device descriptions: object dictionary, SDO server, NMT, heartbeat, TPDOs,
 //! emergencies, LSS and moving quantities.
 //!
-//! Written from CiA 301, CiA 404 and the manuals, without the encoders of the client: a shared mistake would stay
+//! Written from CiA 301, CiA 404 and the manuals, without the encoders of the client. A shared mistake would stay
 //! hidden. No code depends on the name of a device: the descriptions and the files in `models/` contain the
 //! differences.
 //!

@@ -149,7 +149,7 @@ pub fn undo_tare(
 struct AfterWrite {
     offsets: Vec<Offset>,
     after: Samples,
-    /// What proves that the device executed the signature, if it did not acknowledge it.
+    /// The proof that the device executed the signature, if it did not acknowledge it.
     proof: Option<Proof>,
 }
 

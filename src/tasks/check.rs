@@ -246,8 +246,8 @@ pub struct Checker<'a> {
     failed: Vec<NodeId>,
     /// Whether the devices were known before the recording.
     is_bound: bool,
-    /// The sources with at least one sample, if the devices were not known before: the units of other sources may
-    /// still be unknown.
+    /// The sources with at least one sample, if the devices were not known before. The units of other sources may still
+    /// be unknown.
     received: BTreeSet<usize>,
     started: Option<Stamp>,
     failure: Option<Failure>,

@@ -29,7 +29,7 @@ const LISTEN: Duration = Duration::from_secs(3);
 /// The time to observe heartbeats and TPDOs. `log` reports the reasons of silent nodes after the same time.
 const OBSERVATION: Duration = Duration::from_secs(5);
 
-/// What to examine.
+/// The options of an examination.
 #[derive(Clone, Debug)]
 pub struct DoctorOptions {
     /// Examine only this node.
@@ -40,7 +40,7 @@ pub struct DoctorOptions {
     pub lss: bool,
     /// The wait after the last request of the scan.
     pub timeout: Duration,
-    /// How often a node without an answer is asked.
+    /// The number of requests to a node without an answer.
     pub rounds: u32,
     /// Descriptions chosen by the user.
     pub overrides: Overrides,

@@ -86,8 +86,7 @@ impl TemporaryWrite {
         TemporaryWrite { node: node.id, identity, object, before: before.to_vec(), written: written.to_vec() }
     }
 
-    /// Undoes the write of an earlier run, but only on the same device, and only if the object still has the written
-    /// value.
+    /// Undoes the write of an earlier run, if the device is the same and the object still has the written value.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.

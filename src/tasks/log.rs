@@ -84,7 +84,7 @@ pub enum Mode {
 /// An event during a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LogEvent {
-    /// An observation that the summary contains as well.
+    /// An observation that is also in the summary.
     Remark(Remark),
     /// A node sent an emergency message with this meaning.
     Emergency(NodeId, Emergency, String),
@@ -307,8 +307,8 @@ fn survey(
     Ok((nodes, failed))
 }
 
-/// If the answers of a node arrive twice, compares its mapped values, because two devices of one type may differ only
-/// in these values.
+/// If the answers of a node arrive twice, compares its mapped values. Two devices of one type may differ only in these
+/// values.
 pub(super) fn compare_values(master: &mut Master<'_>, node: &Node) -> Result<Result<(), SdoError>, Error> {
     if !master.second_answers().iter().any(|&(twice, _)| twice == node.id) {
         return Ok(Ok(()));

@@ -3,7 +3,7 @@
 use crate::bus::{Mono, Stamp, Wall};
 use std::time::Duration;
 
-/// How long a comparison of the clocks is valid. They drift apart by less than 1 ms in that time.
+/// The time for which a comparison of the clocks is valid. The clocks drift apart by less than 1 ms in this time.
 const COMPARE_EVERY: Duration = Duration::from_secs(1);
 /// The longest time between two readings for a good comparison.
 const CLOSE: Duration = Duration::from_micros(100);

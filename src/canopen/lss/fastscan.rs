@@ -104,7 +104,7 @@ enum Phase {
 #[derive(Clone, Debug)]
 pub struct Fastscan {
     phase: Phase,
-    /// How often all slaves may still be asked.
+    /// The number of remaining requests to all slaves.
     retries: u32,
     /// The numbers found.
     known: [Option<u32>; 4],
@@ -118,7 +118,7 @@ pub struct Fastscan {
     extensions: u8,
     /// Whether the impossible request got no answer.
     has_passed_probe: bool,
-    /// How often it got an answer.
+    /// The number of answers to the impossible request.
     probe_answers: u8,
 }
 

@@ -2,8 +2,8 @@
 //! whole (CiA 301, 7.2.4.3.12 to 7.2.4.3.15).
 //!
 //! Segments are accepted only in order. After a lost segment, the acknowledgement contains the number of the last
-//! segment before it, and the server repeats the rest. After a time-out the position of the server is uncertain. Then
-//! the CRC or the announced size must confirm the data; without both, the transfer fails.
+//! segment before it. The server repeats the rest. After a time-out the position of the server is uncertain. Then the
+//! CRC or the announced size must confirm the data; without both, the transfer fails.
 
 use super::crc::crc16;
 use super::{

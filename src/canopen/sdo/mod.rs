@@ -1,7 +1,7 @@
 //! SDO client: transfers as pure state machines (CiA 301, 7.2.4).
 //!
 //! The caller passes received frames and time-outs to a state machine. The state machine reports whether a frame
-//! belongs to the transfer, the next frames to send, and the end of the transfer. It never waits.
+//! belongs to the transfer. It returns the frames to send, and reports the end. It never waits.
 
 mod abort;
 mod block_download;

@@ -39,8 +39,7 @@ impl Uploaded {
         }
     }
 
-    /// Whether bytes may be missing: the length differs from the announced one, or a segment before the last one is
-    /// short.
+    /// Whether bytes may be missing, because the length is not the announced one or an earlier segment is short.
     pub fn has_doubtful_length(&self) -> bool {
         self.has_short_segment || self.announced.is_some_and(|size| usize::try_from(size) != Ok(self.bytes.len()))
     }
@@ -61,8 +60,8 @@ pub struct Upload {
     segments: usize,
 }
 
-/// Whether this frame proves that a server answers an upload with 60h and the data: it contains the device type
-/// (1000h). 1000h cannot be written, so the frame does not acknowledge a download.
+/// Whether this frame proves that a server answers uploads with 60h. The frame then contains the device type (1000h).
+/// 1000h cannot be written, so the frame does not acknowledge a download.
 pub fn proves_60(frame: &Frame) -> bool {
     let [0x60, 0x00, 0x10, 0, number @ ..] = frame.data() else { return false };
     number.len() == 4 && number.iter().any(|&byte| byte != 0)

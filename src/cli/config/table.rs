@@ -56,9 +56,7 @@ pub(super) fn read(table: &Path, file: &str, with_address: bool) -> anyhow::Resu
         };
         let identity = [number("vendor")?, number("product")?, number("serial")?];
         if identity[2] == 0 {
-            return Err(
-                wrong(line, "serial: devices with the serial number 0 cannot be distinguished".to_owned()).into()
-            );
+            return Err(wrong(line, "serial: the number 0 does not identify a device".to_owned()).into());
         }
         if rows.iter().any(|row| row.identity == identity) {
             return Err(wrong(line, format!("the device with the serial number {} occurs twice", identity[2])).into());
@@ -73,7 +71,7 @@ pub(super) fn read(table: &Path, file: &str, with_address: bool) -> anyhow::Resu
             }
             nodes.push(node);
             if with_address && is_factory_id(identity, node) {
-                let message = format!("node: {node} is the node-ID of a new device, which may be on the bus as well");
+                let message = format!("node: {node} is the node-ID of a new device, which may also be on the bus");
                 return Err(wrong(line, message).hint("choose another node-ID").into());
             }
             replace(&mut document, "address.node-id", Item::Integer(node.get().into()));

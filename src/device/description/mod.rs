@@ -77,7 +77,7 @@ pub struct Description {
     pub bit_rates: BTreeMap<u8, u32>,
     /// The index of automatic bit rate detection, if the device has it.
     pub auto_bit_rate: Option<u8>,
-    /// How the device takes a new node-ID and bit rate; the preferred method first.
+    /// How to set node-ID and bit rate; the preferred method first.
     pub assign: Vec<AssignEntry>,
     /// The object that decides how the device starts after power-on.
     pub startup: Option<Startup>,
@@ -133,7 +133,7 @@ impl ErrorHistory {
 pub struct Autozero {
     /// CiA 404 channel.
     pub channel: u8,
-    /// The object that takes the signature.
+    /// The object to which the signature is written.
     pub object: ObjectId,
     /// The signature in wire order; "zero" in CiA 404.
     pub signature: Vec<u8>,
@@ -187,7 +187,7 @@ impl Identify {
         self.identity_count() == 0 && self.confirm.is_empty()
     }
 
-    /// How many of device type, vendor-ID, product code and device name are given, 0 to 4.
+    /// The number of given values among device type, vendor-ID, product code and device name.
     pub fn identity_count(&self) -> usize {
         let numbers = [self.device_type, self.vendor_id, self.product_code];
         numbers.iter().flatten().count() + usize::from(self.device_name.is_some())

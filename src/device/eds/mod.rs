@@ -1,11 +1,11 @@
 //! EDS and DCF files (CiA 306): the object dictionary that a vendor ships with a device, and the settings of one
 //! device. The module takes bytes and returns a result; it opens no file and prints no warning.
 //!
-//! Few real files follow CiA 306. Deviations with only one meaning are accepted silently: letter case, blanks, line
-//! ends, a byte order mark, UTF-8, Windows-1252, comments after values, `R`, `RW` and
-//! `rwr`, both spellings of Commissioning, `0x180+$NODEID`, overlong lines. Lost, guessed or contradictory data gives a
-//! [`Warning`] with its line: octal numbers, `0.0` for an integer, defaults that do not fit their type, unknown data
-//! types, duplicate keys, sub-objects without an object. A file is rejected only if it describes no object.
+//! Few real files follow CiA 306. Deviations with only one meaning are accepted silently. Examples: letter case,
+//! blanks, line ends, a byte order mark, Windows-1252, comments after values, `R` and `rwr`,
+//! `0x180+$NODEID`, long lines. Lost, guessed or contradictory data gives a [`Warning`] with its line. Examples: octal
+//! numbers, defaults that do not fit their type, unknown data types, duplicate keys. A file is rejected only if it
+//! describes no object.
 //!
 //! `names.rs` describes the names of objects.
 

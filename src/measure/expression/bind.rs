@@ -13,10 +13,10 @@ use crate::measure::layout::{Layout, PARTS};
 use crate::measure::sample::Source;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How many signals an error lists.
+/// The largest number of signals listed in an error.
 const MAX_LISTED: usize = 8;
 
-/// How many objects with similar names an error lists.
+/// The largest number of objects with similar names listed in an error.
 const MAX_OBJECTS: usize = 3;
 
 /// A signal that a node has.
@@ -65,7 +65,7 @@ impl AvailableSignals {
         self.objects.entry((node, name.to_lowercase())).or_insert(signal);
     }
 
-    /// Adds every named object of the description or EDS, also with its name in the EDS, and the parts of signals.
+    /// Adds the parts of signals, and every named object of the description or EDS, also with its EDS name.
     fn add_objects(&mut self, layout: Layout<'_>) {
         for (signal, (part, low)) in layout.signals.iter().flat_map(|signal| PARTS.map(|part| (signal, part))) {
             let (node, name) = (layout.node, format!("{}.{part}", signal.name));

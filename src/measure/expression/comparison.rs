@@ -9,7 +9,7 @@ use crate::measure::sample::Status;
 use crate::measure::statistics::Statistics;
 use std::time::Duration;
 
-/// How often a signal was received.
+/// The number and times of the samples of a signal.
 #[derive(Clone, Copy, Debug, Default)]
 struct Arrivals {
     count: u32,

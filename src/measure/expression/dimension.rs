@@ -9,12 +9,12 @@ use super::formula::Formula;
 use super::tree::{Operator, Position};
 use crate::device::unit::Unit;
 
-/// How many times a value contains the offset of its scale.
+/// The number of offsets of the scale that a value contains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Offsets {
     /// The number of times: 1 in a temperature, 0 in a difference of two.
     Known(f64),
-    /// A number in the expression. It takes the number of the other side.
+    /// A number in the expression. The other side decides.
     Literal,
     /// Unknown, for example in a product of two temperatures.
     Unknown,

@@ -71,7 +71,8 @@ impl BackgroundSurvey {
         survey
     }
 
-    /// Takes the result of a transfer. `None` if the transfer is not part of this survey, or the survey is not complete.
+    /// Handles the result of a transfer. `None` if the transfer is not part of this survey, or the survey is not
+    /// complete.
     pub fn take(
         &mut self,
         ticket: Ticket,

@@ -9,8 +9,8 @@ use crate::measure::sample::Number;
 use crate::node::Node;
 use crate::node::read::{Item, read_known, read_optional};
 
-/// Reads the measuring ranges (6148h, 6149h) if a value depends on them: an integer that may be too narrow, and a
-/// described signal without a status.
+/// Reads the measuring ranges (6148h, 6149h) if a value depends on them. This is an integer that may be too narrow, or
+/// a described signal without a status.
 pub(super) fn read_ranges<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
     // Node, signal, and its two ends.
     type Range = (usize, usize, [(ObjectId, DataType); 2]);

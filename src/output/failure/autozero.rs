@@ -1,4 +1,4 @@
-//! Text for causes, effects and notes: a channel was not set to zero, and what to report about a zero that was set.
+//! Text for causes, effects and notes of `autozero` and `tare`.
 
 use super::Words;
 use crate::canopen::id::NodeId;

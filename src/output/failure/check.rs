@@ -7,7 +7,7 @@ use crate::output::verdict::findings;
 use crate::tasks::Failure;
 use crate::tasks::check::CheckFailure;
 
-/// How many failed expressions a message lists.
+/// The largest number of failed expressions listed in a message.
 const MAX_LISTED: usize = 3;
 
 /// The message and the hint for a cause.

@@ -30,7 +30,7 @@ impl Cycle {
     }
 
     /// The time of the row: that of its first value. If no value was received before the next cycle, it is the start of
-    /// the cycle, so that rows are in order of time.
+    /// the cycle. So rows are in order of time.
     fn at(&self, next: Option<Mono>) -> Stamp {
         self.first.filter(|first| next.is_none_or(|next| first.mono < next)).unwrap_or(self.start)
     }

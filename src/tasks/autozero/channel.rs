@@ -19,7 +19,7 @@ use crate::tasks::read::ReadFailure;
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     pub(super) signal: Signal,
-    /// The object that takes the signature.
+    /// The object to which the signature is written.
     pub(super) object: ObjectId,
     pub(super) signature: Vec<u8>,
     /// The objects that may contain the offset: one if the device is described, else those of CiA 404.

@@ -1,4 +1,4 @@
-//! Causes, effects and notes: a channel was not set to zero, and what to report about a zero that was set.
+//! Causes, effects and notes of `autozero` and `tare`.
 
 use super::ZeroTarget;
 use super::channel::Offset;
@@ -208,7 +208,7 @@ impl Undo {
     }
 }
 
-/// What proves that the device executed a signature without an acknowledgement.
+/// The proof that the device executed a signature without an acknowledgement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Proof {
     /// The offset changed.

@@ -1,5 +1,4 @@
-//! Applies a file to a device: writes the settings that differ, in an order that works on all devices, and reads
-//! everything back.
+//! Applies a file to a device. The differing settings are written in an order that works on all devices, and read back.
 
 use super::check::{FileSettings, Sections, Wanted};
 use super::conditions::check_device;
@@ -199,7 +198,7 @@ impl Work<'_, '_> {
         (id, number(Form::BitRate))
     }
 
-    /// Checks before the first write that a new node-ID is free, and that a device with a new bit rate is alone.
+    /// Checks that a new node-ID is free, and that a device with a new bit rate is alone.
     fn check_bus(&mut self) -> Result<(), Failure> {
         let own = self.before.node.id;
         let (id, rate) = self.address();

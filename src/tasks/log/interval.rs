@@ -20,17 +20,16 @@ pub(super) struct IntervalTracker {
 }
 
 impl IntervalTracker {
-    /// Adds a message received at
-    /// `now`. Returns the interval since the last message if it is a gap: longer than `max_gap`, or by default longer
-    /// than three usual intervals.
+    /// Adds a message received at `now`. Returns the interval since the last message if it is a gap. Without `max_gap`,
+    /// a gap is longer than three usual intervals.
     pub(super) fn add(&mut self, now: Mono, max_gap: Option<Duration>) -> Option<Duration> {
         let mut gap = None;
         if let Some(last) = self.last.filter(|&last| last < now) {
             let interval = now.since(last);
             let longest = max_gap.or(self.usual.map(|usual| usual * GAP_FACTOR));
             gap = longest.filter(|&longest| interval > longest).map(|_| interval);
-            // For the average, an interval is limited to three usual ones, so that one gap does not hide the next gap.
-            // If a sender becomes slower, the average follows within a few messages.
+            // For the average, an interval is limited to three usual ones. So one gap does not hide the next gap. If a
+            // sender becomes slower, the average follows within a few messages.
             self.usual = Some(match self.usual {
                 Some(usual) => (usual * 7 + interval.min(usual * GAP_FACTOR)) / 8,
                 None => interval,

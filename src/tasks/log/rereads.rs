@@ -16,7 +16,7 @@ use crate::node::survey::BackgroundSurvey;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A node is read again after this time without a write, because a change of a mapping consists of many writes.
+/// A node is read again after this time without a write. A change of a mapping consists of many writes.
 const WRITE_SETTLE_TIME: Duration = Duration::from_millis(500);
 /// Interval between two attempts to read a node that does not answer.
 const RETRY_INTERVAL: Duration = Duration::from_secs(1);

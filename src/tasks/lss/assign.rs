@@ -219,8 +219,8 @@ impl Work<'_> {
         Ok(new.is_some_and(|new| session.booted.contains(&new)))
     }
 
-    /// The objects to use after a failure, if the device does not answer LSS, nothing was changed, and the user did not
-    /// choose the method.
+    /// The objects to use if the device does not answer LSS. Nothing may be changed yet, and the user must not have
+    /// chosen the method.
     fn objects_after(&self, failure: &Failure) -> Option<AssignEntry> {
         let is_lss = self.job.via == Via::Auto && self.method.kind == AssignKind::Lss && !self.job.retime;
         let is_silent = is_lss && is_silent(self.device, failure) && self.progress.stored == Stage::NotDone;

@@ -67,8 +67,8 @@ pub fn store(
     with_device(master, &device, notify, |lss| accepted_by_all(lss.store(), force))
 }
 
-/// Activates the configured bit rate: the slave is silent for
-/// `delay_ms`, changes the bit rate, and is silent for the same time again. `None` addresses all slaves. Slaves do not
+/// Activates the configured bit rate. The slave is silent for
+/// `delay_ms`, changes the bit rate, and is silent for `delay_ms` again. `None` addresses all slaves. Slaves do not
 /// acknowledge the request.
 ///
 /// # Errors

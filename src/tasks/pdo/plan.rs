@@ -7,8 +7,8 @@ use crate::device::description::Remap;
 /// The writes that change the settings from `now` to `wanted`; empty if they are equal.
 ///
 /// The mapping is changed while the PDO is off ([`Remap::Invalidate`]) or has no entries ([`Remap::CountOnly`]).
-/// Identifier and inhibit time are changed while the PDO is off. To switch the PDO off, bit 31 of the COB-ID is set and
-/// the other bits are kept, because some devices reject a COB-ID without bit 30. With `never_off` bit 31 is never set.
+/// Identifier and inhibit time are changed while the PDO is off. To switch the PDO off, bit 31 of the COB-ID is set.
+/// The other bits are kept, because some devices reject a COB-ID without bit 30. With `never_off` bit 31 is never set.
 pub(super) fn writes(now: &Settings, wanted: &Settings, remap: Remap, never_off: bool) -> Vec<StepWrite> {
     let number = now.number;
     let remaps = now.mapping != wanted.mapping;

@@ -30,7 +30,7 @@ pub enum Item {
     Name(String, Option<u8>),
 }
 
-/// What triggers the TPDO.
+/// The trigger of the TPDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trigger {
     /// A transmission type (180xh:2).
@@ -48,7 +48,7 @@ pub struct PdoRequest {
     pub number: TpdoNumber,
     /// The new mapping; empty to keep the mapping.
     pub items: Vec<Item>,
-    /// What triggers the TPDO.
+    /// The trigger of the TPDO.
     pub trigger: Option<Trigger>,
     /// The event timer (180xh:5) in ms.
     pub event_timer_ms: Option<u16>,

@@ -113,8 +113,9 @@ struct LimitWrite {
 /// restored.
 ///
 /// # Errors
-/// A number does not fit its object, the lower limit is above the upper limit, the device rejects a limit or does not
-/// answer.
+/// - A number does not fit its object.
+/// - The lower limit is above the upper limit.
+/// - The device rejects a limit or does not answer.
 pub fn set(master: &mut Master<'_>, node: &Node, signal: &str, wanted: &[(Limit, f64)]) -> Result<Limits, Failure> {
     let before = show(master, node, signal)?;
     check_order(node, &before, wanted)?;
@@ -123,7 +124,7 @@ pub fn set(master: &mut Master<'_>, node: &Node, signal: &str, wanted: &[(Limit,
     for &(limit, number) in wanted {
         writes.push(limit_write(node, described, &before, limit, number)?);
     }
-    // A device may reject a lower limit above the present upper limit, so rising limits are written with the upper one
+    // A device may reject a lower limit above the present upper limit. So rising limits are written with the upper one
     // first.
     if writes.iter().any(|write| write.limit == Limit::Upper && write.rises) {
         writes.reverse();
