@@ -29,7 +29,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -s t -l timeout -d 'Long
 complete -c cangauge -n "__fish_cangauge_needs_command" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_needs_command" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_needs_command" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -42,7 +42,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -l color -d 'Use colour 
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_needs_command" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_needs_command" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_needs_command" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_needs_command" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_needs_command" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_needs_command" -s v -l verbose -d 'Print more on stderr'
@@ -54,7 +54,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "read" -d 'Read me
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "nmt" -d 'Send NMT commands and show NMT states'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not satisfied, 3: no data)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "lss" -d 'Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "info" -d 'Show everything about a device on one page'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "status" -d 'Show everything about a device on one page'
@@ -62,18 +62,18 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "unit" -d 'Show or
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "filter" -d 'Show or set the filter of a signal: type (61A0h) and constant (61A1h)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "limits" -d 'Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "minmax" -d 'Show the lowest and highest value that the device has measured, or reset them'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "errors" -d 'Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "bus" -d 'List CAN interfaces, bring them up and down, find the bit rate of a bus'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "errors" -d 'Show the errors of a device, register (1001h) and history (1003h), or clear the history'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "bus" -d 'List CAN interfaces, bring them up and down, and find the bit rate of a bus'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "pdo" -d 'Show, change and watch the transmit PDOs of nodes'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "config" -d 'Show all settings of a device as a file, compare them with a file, and set them from a file'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "autozero" -d 'Set the zero of a channel (6125h), with checks before and after'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "zero" -d 'Set the zero of a channel (6125h), with checks before and after'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "tare" -d 'Set the net value of a channel to zero (6139h), or undo this'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "tare" -d 'Set the net value of a channel to zero (6139h), or restore it (--undo)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "store" -d 'Save settings to non-volatile memory (1010h)'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "restore" -d 'Restore factory defaults (1011h); node-ID and bit rate stay'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "restore" -d 'Restore factory defaults (1011h), except node-ID and bit rate'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "doctor" -d 'Find out why a node or the whole bus is silent'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "objects" -d 'Show what a description or an EDS states about a device\'s objects'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "objects" -d 'Show the objects of a device from its description or EDS'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "export" -d 'Describe the TPDOs of nodes for other programs'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "devices" -d 'List device descriptions; show one as TOML, check a file, or describe a new device'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "completions" -d 'Print the completion script for a shell'
@@ -83,7 +83,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s t -l timeout 
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -97,7 +97,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l passive -d 'Send nothing: list the nodes that send something within 3 s (or --timeout)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s v -l verbose -d 'Print more on stderr'
@@ -108,7 +108,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s t -l timeout -d
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -122,7 +122,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l passive -d 'Send nothing: list the nodes that send something within 3 s (or --timeout)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s v -l verbose -d 'Print more on stderr'
@@ -134,7 +134,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s t -l timeout 
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -147,7 +147,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l color -d 'Use
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s v -l verbose -d 'Print more on stderr'
@@ -158,7 +158,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -171,27 +171,27 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "start" -d 'Set nodes to OPERATIONAL: they send their TPDOs'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "start" -d 'Set nodes to OPERATIONAL: nodes send TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "stop" -d 'Set nodes to STOPPED: only NMT, heartbeat and LSS work'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "preop" -d 'Set nodes to PRE-OPERATIONAL: everything except PDOs works'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "reset" -d 'Restart the application (reset node)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "reset-comm" -d 'Restart the communication'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "state" -d 'Show states, from the heartbeat or node guarding; "-" if unknown'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "watch" -d 'Follow heartbeats, boot-ups and losses until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "startup" -d 'Show or set the start after power-on: wait (for the master) or auto (the device starts itself)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "startup" -d 'Show or set the start after power-on: wait (for the master) or auto (the device starts by itself)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -204,11 +204,11 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s v -l verbose -d 'Print more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l confirm -d 'Exit with 3 if nothing confirms the state'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l confirm -d 'Exit with 3 if the state cannot be confirmed'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s V -l version -d 'Print version'
@@ -217,7 +217,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -230,11 +230,11 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s v -l verbose -d 'Print more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l confirm -d 'Exit with 3 if nothing confirms the state'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l confirm -d 'Exit with 3 if the state cannot be confirmed'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s V -l version -d 'Print version'
@@ -243,7 +243,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -256,11 +256,11 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s v -l verbose -d 'Print more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l confirm -d 'Exit with 3 if nothing confirms the state'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l confirm -d 'Exit with 3 if the state cannot be confirmed'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s V -l version -d 'Print version'
@@ -269,7 +269,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -282,11 +282,11 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s v -l verbose -d 'Print more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l confirm -d 'Exit with 3 if nothing confirms the state'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l confirm -d 'Exit with 3 if the state cannot be confirmed'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s V -l version -d 'Print version'
@@ -295,7 +295,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -308,11 +308,11 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s v -l verbose -d 'Print more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l confirm -d 'Exit with 3 if nothing confirms the state'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l confirm -d 'Exit with 3 if the state cannot be confirmed'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s V -l version -d 'Print version'
@@ -321,7 +321,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -334,11 +334,11 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s v -l verbose -d 'Print more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l probe -d 'If the state is unknown, switch the heartbeat on for a moment (1017h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l probe -d 'If the state is unknown, switch on the heartbeat (1017h) for a moment'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
@@ -346,7 +346,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -360,7 +360,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s d -l duration -d 'End after this time' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s v -l verbose -d 'Print more on stderr'
@@ -371,7 +371,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -384,27 +384,27 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "start" -d 'Set nodes to OPERATIONAL: they send their TPDOs'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "start" -d 'Set nodes to OPERATIONAL: nodes send TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "stop" -d 'Set nodes to STOPPED: only NMT, heartbeat and LSS work'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "preop" -d 'Set nodes to PRE-OPERATIONAL: everything except PDOs works'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "reset" -d 'Restart the application (reset node)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "reset-comm" -d 'Restart the communication'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "state" -d 'Show states, from the heartbeat or node guarding; "-" if unknown'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "watch" -d 'Follow heartbeats, boot-ups and losses until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "startup" -d 'Show or set the start after power-on: wait (for the master) or auto (the device starts itself)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "startup" -d 'Show or set the start after power-on: wait (for the master) or auto (the device starts by itself)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -417,7 +417,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s v -l verbose -d 'Print more on stderr'
@@ -431,7 +431,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -449,7 +449,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 never\t'Never'
 auto\t'For long objects'"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s v -l verbose -d 'Print more on stderr'
@@ -463,7 +463,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -476,7 +476,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l type -d 'Encode the value as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo-size -d 'Whether the request contains the size. auto follows the description; if the device rejects this form, the other one is sent' -r -f -a "indicated\t'With the size: 2Fh, 2Bh, 27h, 23h'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo-size -d 'Include the size in the request. auto follows the description; if the device rejects this form, the other form is sent' -r -f -a "indicated\t'With the size: 2Fh, 2Bh, 27h, 23h'
 omit\t'Without the size: 22h'
 auto\t'As in the description of the device'"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l input -d 'Write the bytes of a file; - for stdin' -r -F
@@ -484,7 +484,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 never\t'Never'
 auto\t'For long objects'"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s v -l verbose -d 'Print more on stderr'
@@ -517,7 +517,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s t -l timeout -
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -532,10 +532,10 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l passive -d 'Send nothing at all'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Do not change the NMT state of the nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite existing files'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l append -d 'Continue existing files with the same columns. A last line that was cut off is removed'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l append -d 'Append to existing files with the same columns. An incomplete last line is removed'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l bom -d 'Start CSV with a byte order mark, which some spreadsheets need'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Print more on stderr'
@@ -550,7 +550,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s t -l timeout
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -563,7 +563,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l color -d 'Us
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s v -l verbose -d 'Print more on stderr'
@@ -574,7 +574,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -587,7 +587,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s v -l verbose -d 'Print more on stderr'
@@ -595,19 +595,19 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "scan" -d 'List devices with a node-ID (found by SDO) and without one (found by fastscan)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "inquire" -d 'Read the identity and node-ID of a device by LSS'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set-id" -d 'Set the node-ID of a device: check that it is free, configure, store, reset, confirm'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set-id" -d 'Set the node-ID of a device: check that the node-ID is free, configure, store, reset, confirm'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set-bitrate" -d 'Set the bit rate of a device'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set" -d 'Set the node-ID and bit rate of a device, with one store and one reset'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "activate" -d 'Activate the configured bit rate. The device is silent for DELAY before the change, and for DELAY after it'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "store" -d 'Store node-ID and bit rate in non-volatile memory'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if none answers'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if no device answers'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -620,7 +620,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s v -l verbose -d 'Print more on stderr'
@@ -631,7 +631,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -644,7 +644,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s v -l verbose -d 'Print more on stderr'
@@ -658,7 +658,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -673,13 +673,13 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l no-store -d 'Do not store: a power cycle restores the old values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l force -d 'Accept more than one device for "only": all of them change'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l table-index -d 'Index of the bit rate in the table of the device; --retime needs RATE as well' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l table-index -d 'Index of the bit rate in the table of the device; --retime also needs RATE' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l via -d 'Method: lss, sdo (objects of the device), or auto (the preferred method in its description)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
@@ -688,7 +688,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -700,11 +700,11 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retime -d 'Switch the host interface as well; store after the device responds at the new bit rate. Requires that the device is the only one on the bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retime -d 'Also switch the host interface; store after the device responds at the new bit rate. The device must be the only one on the bus'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l no-store -d 'Do not store: a power cycle restores the old values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l force -d 'Accept more than one device for "only": all of them change'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s v -l verbose -d 'Print more on stderr'
@@ -712,7 +712,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l id -d 'New node-ID' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l bitrate -d '250k, 1M, 125000; auto if the device supports it' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l table-index -d 'Index of the bit rate in the table of the device; --retime needs RATE as well' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l table-index -d 'Index of the bit rate in the table of the device; --retime also needs RATE' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l via -d 'Method: lss, sdo (objects of the device), or auto (the preferred method in its description)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
@@ -721,7 +721,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -733,11 +733,11 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retime -d 'Switch the host interface as well; store after the device responds at the new bit rate. Requires that the device is the only one on the bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retime -d 'Also switch the host interface; store after the device responds at the new bit rate. The device must be the only one on the bus'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l no-store -d 'Do not store: a power cycle restores the old values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l force -d 'Accept more than one device for "only": all of them change'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s v -l verbose -d 'Print more on stderr'
@@ -748,7 +748,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -762,7 +762,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l force -d 'Accept more than one device for "only"'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s v -l verbose -d 'Print more on stderr'
@@ -773,7 +773,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -787,7 +787,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l force -d 'Accept more than one device for "only"'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s v -l verbose -d 'Print more on stderr'
@@ -798,7 +798,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -811,7 +811,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s v -l verbose -d 'Print more on stderr'
@@ -819,19 +819,19 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "scan" -d 'List devices with a node-ID (found by SDO) and without one (found by fastscan)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "inquire" -d 'Read the identity and node-ID of a device by LSS'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set-id" -d 'Set the node-ID of a device: check that it is free, configure, store, reset, confirm'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set-id" -d 'Set the node-ID of a device: check that the node-ID is free, configure, store, reset, confirm'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set-bitrate" -d 'Set the bit rate of a device'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set" -d 'Set the node-ID and bit rate of a device, with one store and one reset'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "activate" -d 'Activate the configured bit rate. The device is silent for DELAY before the change, and for DELAY after it'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "store" -d 'Store node-ID and bit rate in non-volatile memory'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if none answers'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if no device answers'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -844,7 +844,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l color -d 'Use
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s v -l verbose -d 'Print more on stderr'
@@ -855,7 +855,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s t -l timeou
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -868,7 +868,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l color -d 'U
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s v -l verbose -d 'Print more on stderr'
@@ -879,7 +879,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s t -l timeout 
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -892,7 +892,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l color -d 'Use
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s v -l verbose -d 'Print more on stderr'
@@ -901,14 +901,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s V -l version 
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l type -d 'Filter type' -r -f -a "none\t''
 moving\t''
 repeating\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l constant -d 'Filter constant: number of values' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l damping -d 'Time in which the value follows a step; the device calculates the constant' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l constant -d 'Filter constant: number of samples' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l damping -d 'Settling time after a step; the device calculates the constant from it' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -921,22 +921,22 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l color -d 'U
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l delta -d 'Send if the value changes by at least this; 0: off' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l lower -d 'Lower limit: send if the value falls below it' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l upper -d 'Upper limit: send if the value rises above it' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l delta -d 'Delta: send if the value changes by at least this much; 0: off' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l lower -d 'Lower limit: send if the value falls below this limit' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l upper -d 'Upper limit: send if the value rises above this limit' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l hysteresis -d 'Hysteresis before a limit triggers again' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -949,7 +949,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l color -d 'U
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s v -l verbose -d 'Print more on stderr'
@@ -960,7 +960,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s t -l timeou
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -974,7 +974,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l reset -d 'Reset, and print the previous values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s v -l verbose -d 'Print more on stderr'
@@ -985,7 +985,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s t -l timeou
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -999,7 +999,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l clear -d 'Delete the history; a pending error stays in the register'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s v -l verbose -d 'Print more on stderr'
@@ -1010,7 +1010,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1023,7 +1023,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s v -l verbose -d 'Print more on stderr'
@@ -1039,7 +1039,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1052,7 +1052,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s v -l verbose -d 'Print more on stderr'
@@ -1063,7 +1063,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1077,7 +1077,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l listen-only -d 'Listen only: send no frame, no acknowledgement and no error flag'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s v -l verbose -d 'Print more on stderr'
@@ -1088,7 +1088,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1101,7 +1101,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s v -l verbose -d 'Print more on stderr'
@@ -1113,7 +1113,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1127,7 +1127,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l active -d 'If nothing is received, ask each node-ID for its device type at each bit rate. Only for a bench with one device: at a wrong bit rate this disturbs every frame on the bus'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s v -l verbose -d 'Print more on stderr'
@@ -1143,7 +1143,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1156,7 +1156,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s v -l verbose -d 'Print more on stderr'
@@ -1171,7 +1171,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1184,7 +1184,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s v -l verbose -d 'Print more on stderr'
@@ -1195,7 +1195,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1212,7 +1212,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l inhibit -d 'Inhibit time: shortest time between two transmissions, in steps of 100us; 0: none' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l cob-id -d 'CAN identifier, 11 bits: 0x1A5' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s v -l verbose -d 'Print more on stderr'
@@ -1224,7 +1224,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1238,7 +1238,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s d -l duration -d 'End after this time' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s v -l verbose -d 'Print more on stderr'
@@ -1253,7 +1253,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1266,7 +1266,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s v -l verbose -d 'Print more on stderr'
@@ -1282,7 +1282,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1295,7 +1295,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s v -l verbose -d 'Print more on stderr'
@@ -1308,7 +1308,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1321,7 +1321,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s v -l verbose -d 'Print more on stderr'
@@ -1334,7 +1334,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1349,7 +1349,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l table -d 'Configure many devices, one per row. Columns: vendor, product, serial, node (with --address), and one for each {NAME} in the file. A device that is not in the table is not changed' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l record -d 'Write a record: time, devices, old and new values, verification. HTML if the name ends with .html, else JSON' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s v -l verbose -d 'Print more on stderr'
@@ -1367,7 +1367,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1380,7 +1380,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s v -l verbose -d 'Print more on stderr'
@@ -1399,7 +1399,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s t -l time
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1415,7 +1415,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l force -d 
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l store -d 'Store the offset, with the other application settings'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l dry-run -d 'Measure and check only; change nothing'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s v -l verbose -d 'Print more on stderr'
@@ -1429,7 +1429,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s t -l timeout 
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1445,19 +1445,19 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l force -d 'Ski
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l store -d 'Store the offset, with the other application settings'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l dry-run -d 'Measure and check only; change nothing'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l channel -d 'Channel [default: the only one with a tare]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l channel -d 'Channel [default: the only channel with a tare]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1469,9 +1469,9 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l undo -d 'Set the tare zero to 0: the net value is the process value again'
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l undo -d 'Set the tare zero to 0, so that the net value is the process value again'
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s v -l verbose -d 'Print more on stderr'
@@ -1485,7 +1485,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s t -l timeout
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1499,7 +1499,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l verify -d 'Reset the node, read the stored settings again, and compare'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s v -l verbose -d 'Print more on stderr'
@@ -1513,7 +1513,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s t -l timeo
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1527,7 +1527,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l reset -d 'Reset the node, and compare with its description'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s v -l verbose -d 'Print more on stderr'
@@ -1539,7 +1539,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s t -l timeout -
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1552,7 +1552,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l color -d 'Use 
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s v -l verbose -d 'Print more on stderr'
@@ -1563,7 +1563,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -s t -l timeou
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1577,7 +1577,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l passive -d 'Send nothing'
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -s v -l verbose -d 'Print more on stderr'
@@ -1588,7 +1588,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s t -l timeo
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1601,7 +1601,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l color -d '
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s v -l verbose -d 'Print more on stderr'
@@ -1612,7 +1612,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1625,20 +1625,20 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -f -a "dbc" -d 'Print a DBC of the TPDOs as they are mapped now'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -f -a "dbc" -d 'Print a DBC file with the present mapping of the TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1651,20 +1651,20 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_see
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from help" -f -a "dbc" -d 'Print a DBC of the TPDOs as they are mapped now'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from help" -f -a "dbc" -d 'Print a DBC file with the present mapping of the TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1677,14 +1677,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fis
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "show" -d 'Print a description as TOML'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "new" -d 'Print a first description of a device, made from the device and its EDS (--eds); comments show what to complete'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "new" -d 'Print a first description of a device from the device and its EDS (--eds); comments mark missing parts'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "check" -d 'Report each mistake in a description file with its line'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
@@ -1692,7 +1692,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1705,7 +1705,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s v -l verbose -d 'Print more on stderr'
@@ -1716,7 +1716,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1729,7 +1729,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s v -l verbose -d 'Print more on stderr'
@@ -1740,7 +1740,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1753,14 +1753,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "show" -d 'Print a description as TOML'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "new" -d 'Print a first description of a device, made from the device and its EDS (--eds); comments show what to complete'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "new" -d 'Print a first description of a device from the device and its EDS (--eds); comments mark missing parts'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "check" -d 'Report each mistake in a description file with its line'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
@@ -1768,7 +1768,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s t -l t
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l sdo -d 'COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1781,7 +1781,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l color 
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s v -l verbose -d 'Print more on stderr'
@@ -1792,46 +1792,46 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "nmt" -d 'Send NMT commands and show NMT states'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not satisfied, 3: no data)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "lss" -d 'Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "info" -d 'Show everything about a device on one page'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "unit" -d 'Show or set the physical unit of a signal (6131h)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "filter" -d 'Show or set the filter of a signal: type (61A0h) and constant (61A1h)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "limits" -d 'Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "minmax" -d 'Show the lowest and highest value that the device has measured, or reset them'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "errors" -d 'Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "bus" -d 'List CAN interfaces, bring them up and down, find the bit rate of a bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "errors" -d 'Show the errors of a device, register (1001h) and history (1003h), or clear the history'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "bus" -d 'List CAN interfaces, bring them up and down, and find the bit rate of a bus'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "pdo" -d 'Show, change and watch the transmit PDOs of nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "config" -d 'Show all settings of a device as a file, compare them with a file, and set them from a file'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "autozero" -d 'Set the zero of a channel (6125h), with checks before and after'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "tare" -d 'Set the net value of a channel to zero (6139h), or undo this'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "tare" -d 'Set the net value of a channel to zero (6139h), or restore it (--undo)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "store" -d 'Save settings to non-volatile memory (1010h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "restore" -d 'Restore factory defaults (1011h); node-ID and bit rate stay'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "restore" -d 'Restore factory defaults (1011h), except node-ID and bit rate'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "doctor" -d 'Find out why a node or the whole bus is silent'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "objects" -d 'Show what a description or an EDS states about a device\'s objects'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "objects" -d 'Show the objects of a device from its description or EDS'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "export" -d 'Describe the TPDOs of nodes for other programs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "devices" -d 'List device descriptions; show one as TOML, check a file, or describe a new device'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "completions" -d 'Print the completion script for a shell'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "start" -d 'Set nodes to OPERATIONAL: they send their TPDOs'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "start" -d 'Set nodes to OPERATIONAL: nodes send TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "stop" -d 'Set nodes to STOPPED: only NMT, heartbeat and LSS work'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "preop" -d 'Set nodes to PRE-OPERATIONAL: everything except PDOs works'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "reset" -d 'Restart the application (reset node)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "reset-comm" -d 'Restart the communication'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "state" -d 'Show states, from the heartbeat or node guarding; "-" if unknown'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "watch" -d 'Follow heartbeats, boot-ups and losses until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "startup" -d 'Show or set the start after power-on: wait (for the master) or auto (the device starts itself)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "startup" -d 'Show or set the start after power-on: wait (for the master) or auto (the device starts by itself)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from sdo" -f -a "read" -d 'Read objects and print their unscaled values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from sdo" -f -a "write" -d 'Write an object, or several OBJECT=VALUE'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "scan" -d 'List devices with a node-ID (found by SDO) and without one (found by fastscan)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "inquire" -d 'Read the identity and node-ID of a device by LSS'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set-id" -d 'Set the node-ID of a device: check that it is free, configure, store, reset, confirm'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set-id" -d 'Set the node-ID of a device: check that the node-ID is free, configure, store, reset, confirm'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set-bitrate" -d 'Set the bit rate of a device'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set" -d 'Set the node-ID and bit rate of a device, with one store and one reset'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "activate" -d 'Activate the configured bit rate. The device is silent for DELAY before the change, and for DELAY after it'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "store" -d 'Store node-ID and bit rate in non-volatile memory'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if none answers'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if no device answers'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from bus" -f -a "list" -d 'List the CAN interfaces of this computer with bit rate, state and error counters, and the serial adapters'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from bus" -f -a "up" -d 'Bring an interface up at a bit rate'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from bus" -f -a "down" -d 'Bring an interface down'
@@ -1843,7 +1843,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "diff" -d 'Compare a device with a file, two devices, or two files; exit 1 if anything differs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "apply" -d 'Configure a device from a file: check the file, write the differences, read everything back'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "schema" -d 'Print the JSON Schema of the file, for editors'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from export" -f -a "dbc" -d 'Print a DBC of the TPDOs as they are mapped now'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from export" -f -a "dbc" -d 'Print a DBC file with the present mapping of the TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "show" -d 'Print a description as TOML'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "new" -d 'Print a first description of a device, made from the device and its EDS (--eds); comments show what to complete'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "new" -d 'Print a first description of a device from the device and its EDS (--eds); comments mark missing parts'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "check" -d 'Report each mistake in a description file with its line'

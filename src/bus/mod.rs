@@ -235,7 +235,7 @@ pub enum Fault {
     Transceiver,
     /// A transmission took too long.
     TransmitTimeout,
-    /// The adapter or server sent text that cannot be read. A frame may be lost.
+    /// The adapter or server sent invalid text. A frame may be lost.
     Garbled,
     /// Another fault.
     Other,
@@ -269,7 +269,7 @@ pub enum TimestampSource {
     Kernel,
     /// The clock of this program, when it read the frame.
     Program,
-    /// The socketcand server, converted to the host's time.
+    /// The clock of the socketcand server, converted to the time of the host.
     Server,
     /// The clock of the simulated bus.
     Simulated,

@@ -17,7 +17,7 @@ pub(super) fn readable<const N: usize>(fds: [BorrowedFd<'_>; N], limit: Duration
     }
 }
 
-/// Polls any number of descriptors. Those with `true` are also ready when they can be written.
+/// Polls any number of descriptors. Descriptors with `true` are also ready when they are writable.
 pub(super) fn ready(fds: &[(BorrowedFd<'_>, bool)], limit: Duration) -> io::Result<Vec<bool>> {
     let poll = |(fd, writes): &(BorrowedFd<'_>, bool)| {
         let events = if *writes { libc::POLLIN | libc::POLLOUT } else { libc::POLLIN };

@@ -9,7 +9,7 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Where a byte stream is opened.
+/// The place of a byte stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     /// A serial port and its speed in bit/s.
@@ -36,7 +36,7 @@ pub(super) enum Port {
 }
 
 impl Port {
-    /// Opens a serial port, and locks it: two programs at one adapter would disturb each other.
+    /// Opens a serial port and locks it, because two programs at one adapter would disturb each other.
     pub(super) fn serial(path: &PathBuf, speed: u32) -> io::Result<Port> {
         let mut port = SerialPort::open(path, speed)?;
         port.set_read_timeout(Duration::ZERO)?;
@@ -51,12 +51,12 @@ impl Port {
         Ok(Port::Serial(port))
     }
 
-    /// Begins a TCP connection. It is complete when the port can be written, see [`Port::connected`].
+    /// Starts a TCP connection. The connection is complete when the port is writable, see [`Port::connected`].
     pub(super) fn tcp(address: SocketAddr) -> io::Result<Port> {
         let socket = Socket::new(Domain::for_address(address), Type::STREAM, Some(Protocol::TCP))?;
         socket.set_nonblocking(true)?;
         socket.set_tcp_nodelay(true)?;
-        // A host without power or network is noticed within half a minute.
+        // Detects a host without power or network within half a minute.
         let keepalive = TcpKeepalive::new().with_time(Duration::from_secs(10)).with_interval(Duration::from_secs(5));
         socket.set_tcp_keepalive(&keepalive)?;
         match socket.connect(&SockAddr::from(address)) {
@@ -74,7 +74,7 @@ impl Port {
         }
     }
 
-    /// Reads available bytes; 0: there are none yet.
+    /// Reads available bytes; 0 if no bytes are available yet.
     ///
     /// # Errors
     /// The connection ended.
@@ -105,7 +105,7 @@ impl Port {
 pub struct SerialAdapter {
     /// The device: `/dev/ttyACM0`.
     pub path: String,
-    /// The product, as its USB descriptor names it.
+    /// The product name in the USB descriptor.
     pub product: Option<String>,
 }
 
@@ -124,7 +124,7 @@ fn adapter(path: &Path, sysfs: &Path) -> Option<SerialAdapter> {
     if name.starts_with("ttyS") || name.starts_with("ttyAMA") {
         return None;
     }
-    // ttyACM0: its USB interface, in the device. ttyUSB0: one more level in between.
+    // The product name is one level above the device of ttyACM0, and two levels above that of ttyUSB0.
     let product = ["../product", "../../product"].into_iter().find_map(|up| {
         let text = std::fs::read_to_string(sysfs.join(name).join("device").canonicalize().ok()?.join(up)).ok()?;
         Some(super::stream::printable(text.trim()))
@@ -134,12 +134,12 @@ fn adapter(path: &Path, sysfs: &Path) -> Option<SerialAdapter> {
 
 fn is_pending(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
-    // A connection that has begun.
+    // The connection has started.
     #[cfg(unix)]
     if error.raw_os_error() == Some(libc::EINPROGRESS) {
         return true;
     }
-    // A TCP connection ends with TimedOut as well, but then with a code of the system.
+    // A broken TCP connection also has the kind TimedOut, but with a system error code.
     match error.kind() {
         WouldBlock | Interrupted => true,
         TimedOut => error.raw_os_error().is_none(),
@@ -165,7 +165,7 @@ impl std::os::fd::AsFd for Port {
 #[cfg(unix)]
 pub(super) use std::os::fd::AsFd as Waitable;
 
-/// Anything: other systems do not wait for a descriptor.
+/// A placeholder, because other systems do not wait for a descriptor.
 #[cfg(not(unix))]
 pub(super) trait Waitable {}
 #[cfg(not(unix))]
@@ -189,7 +189,7 @@ pub(super) fn wait(
     Ok(ready)
 }
 
-/// The same where the system cannot wait for both: in short steps.
+/// Like the variant for Unix, but in short steps, because other systems cannot wait for both.
 #[cfg(not(unix))]
 pub(super) fn wait(sources: &[(&dyn Waitable, bool)], _: &mut Interrupts, limit: Duration) -> io::Result<Vec<bool>> {
     std::thread::sleep(limit.min(Duration::from_millis(1)));

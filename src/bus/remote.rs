@@ -1,4 +1,4 @@
-//! The names of buses behind a byte stream, and which transport serves each of them.
+//! Parses the names of buses behind a byte stream, and opens their transports.
 
 use super::port::Place;
 pub use super::port::{SerialAdapter, adapters};
@@ -29,19 +29,19 @@ enum Transport {
     Slcan(u32),
 }
 
-/// How a bus is opened.
+/// The purpose of opening a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
     /// To send and to receive.
     Normal,
-    /// To receive only: the adapter also sends no acknowledge.
+    /// To receive only. The adapter does not send acknowledgements.
     Listen,
-    /// To set the bit rate first: the channel stays closed.
+    /// To set the bit rate first. The channel stays closed.
     Configure,
 }
 
 impl Remote {
-    /// The bus that `text` names; `None` if it is of another kind.
+    /// Parses the name of a bus; `None` for other kinds of buses.
     ///
     /// # Errors
     /// A mistake in the name.
@@ -65,7 +65,7 @@ impl Remote {
     /// Opens the bus.
     ///
     /// # Errors
-    /// The adapter or server cannot be reached, or refuses.
+    /// The adapter or server cannot be reached, or rejects the request.
     pub fn open(&self, purpose: Use) -> Result<Box<dyn Bus>, BusError> {
         Ok(match &self.transport {
             Transport::Socketcand(bus) => Box::new(StreamBus::open(&self.name, &self.place, Client::new(bus))?),
@@ -149,7 +149,7 @@ const RATES: std::ops::RangeInclusive<u32> = 1_000..=1_000_000;
 /// A bit rate of CAN in bit/s: `250k`, `1M`, `125000`.
 ///
 /// # Errors
-/// It is none.
+/// The text is not a bit rate.
 pub fn bit_rate(text: &str) -> Result<u32, String> {
     let (number, factor) = match text.strip_suffix(['k', 'K']) {
         Some(number) => (number, 1_000),

@@ -1,5 +1,5 @@
-//! A bus whose other participants are the clients of a socketcand server: each receives the frames of this program and
-//! of the other clients.
+//! A socketcand server as a bus. Its clients are the other participants. Each client receives the frames of this
+//! program and of the other clients.
 
 use super::interrupt::Interrupts;
 use super::port::{Waitable, wait};
@@ -13,12 +13,12 @@ use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-/// A client that leaves more bytes than this unread is disconnected.
+/// A client with more unread bytes is disconnected.
 const MAX_WAITING: usize = 256 * 1024;
-/// More clients than this are not accepted.
+/// The largest number of clients.
 const MAX_CLIENTS: usize = 64;
 
-/// Where a server listens: `29536` on this computer only, `0.0.0.0:29536`, `[::]:29536`.
+/// The address of a server: `29536` (only on this computer), `0.0.0.0:29536`, `[::]:29536`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Address(SocketAddr);
 
@@ -50,7 +50,7 @@ impl fmt::Display for Address {
     }
 }
 
-/// A socketcand server. Each name of a bus that a client opens is this bus.
+/// A socketcand server. Clients can open this bus with any name.
 pub struct Server {
     name: String,
     listener: TcpListener,
@@ -88,7 +88,7 @@ impl Client {
         self.is_gone |= self.waiting.len() > MAX_WAITING;
     }
 
-    /// Reads what the client sent. Returns its frames.
+    /// Reads from the client. Returns the received frames.
     fn read(&mut self) -> Vec<Frame> {
         let mut buffer = [0; 4096];
         let count = match self.stream.read(&mut buffer) {
@@ -136,7 +136,7 @@ impl Server {
     /// Listens at an address.
     ///
     /// # Errors
-    /// The address is in use, or not one of this host.
+    /// The address is in use, or does not belong to this host.
     pub fn listen(address: Address) -> Result<Server, BusError> {
         let failed = |source| BusError::Io { what: format!("listen at {address}"), source };
         let listener = TcpListener::bind(address.0).map_err(failed)?;
@@ -152,7 +152,7 @@ impl Server {
         })
     }
 
-    /// The address, with the port that the system has chosen.
+    /// The address, with the port chosen by the system.
     ///
     /// # Errors
     /// Those of the system.
@@ -165,7 +165,7 @@ impl Server {
             if self.clients.len() >= MAX_CLIENTS || stream.set_nonblocking(true).is_err() {
                 continue;
             }
-            // Only a matter of speed.
+            // This option only improves the speed.
             let _ = stream.set_nodelay(true);
             let mut client = Client {
                 stream,
@@ -182,7 +182,7 @@ impl Server {
 
     /// Passes a frame to all clients except its sender.
     fn pass(&mut self, frame: &Frame, sender: Option<usize>) {
-        // The protocol has no remote frames.
+        // The protocol does not support remote frames.
         if frame.is_remote() {
             return;
         }

@@ -1,8 +1,8 @@
-//! The text of socketcand in raw mode: the client's side, and the messages that client and server share.
+//! The protocol of socketcand in raw mode: the client, and the common messages of client and server.
 //!
-//! Each message stands in `<` and `>`. After `< hi >` the client sends `< open can0 >` and `< rawmode >`, each answered
-//! with `< ok >`. Then frames come as `< frame 1A4 1436509052.249713 0011AA >`, and go as `< send 1A4 3 0 11 aa >`. Remote
-//! frames do not exist in this protocol.
+//! Each message is enclosed in `<` and `>`. After `< hi >` the client sends `< open can0 >` and `< rawmode >`. The
+//! server answers each one with `< ok >`. Received frames are `< frame 1A4 1436509052.249713 0011AA >`, sent frames are
+//! `< send 1A4 3 0 11 aa >`. The protocol does not support remote frames.
 
 use super::own_clock::OwnClock;
 use super::stream::{Output, Protocol};
@@ -15,21 +15,21 @@ use std::time::Duration;
 const OPEN_TIMEOUT: Duration = Duration::from_secs(5);
 /// The longest message. Longer ones are discarded.
 const MAX_MESSAGE: usize = 256;
-/// How much of a foreign greeting is shown, in bytes.
+/// The number of bytes of an unknown greeting that are shown.
 const MAX_GREETING: usize = 40;
 
-/// Finds messages in a stream of bytes that is cut at any place.
+/// Finds messages in a stream of bytes that arrive in pieces.
 #[derive(Debug, Default)]
 pub(super) struct Messages {
     /// The message so far; `None` outside of one.
     text: Option<Vec<u8>>,
-    /// Bytes that belong to no message, the first ones.
+    /// The first bytes outside of messages.
     noise: Vec<u8>,
 }
 
 impl Messages {
-    /// Passes each complete message to `found`, without its brackets and the space inside them. `None` is a stretch
-    /// of bytes that are no message.
+    /// Passes each complete message to `found`, without brackets and outer blanks. `None` means bytes that are not a
+    /// message.
     pub(super) fn feed(&mut self, bytes: &[u8], mut found: impl FnMut(Option<&str>)) {
         for &byte in bytes {
             match (byte, &mut self.text) {
@@ -62,7 +62,7 @@ impl Messages {
     }
 }
 
-/// The identifier of a message: three digits, or eight of an extended one.
+/// The identifier of a message: three digits, or eight digits for 29 bits.
 fn identifier(text: &str) -> Option<CanId> {
     let number = hexadecimal(text)?;
     match text.len() {
@@ -111,14 +111,14 @@ fn bytes(words: &[&str]) -> Option<Vec<u8>> {
     words.iter().map(|word| hexadecimal(word).and_then(|number| u8::try_from(number).ok())).collect()
 }
 
-/// The frame of `send ID LENGTH BYTES`, as clients send it.
+/// The frame of `send ID LENGTH BYTES` from a client.
 pub(super) fn sent_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Frame> {
     let (id, length) = (identifier(words.next()?)?, hexadecimal(words.next()?)?);
     let data = bytes(&words.collect::<Vec<_>>())?;
     (u32::try_from(data.len()) == Ok(length)).then(|| Frame::new(id, &data).ok()).flatten()
 }
 
-/// The message with which a server passes a frame on.
+/// The message of a server with a frame.
 pub(super) fn frame_message(frame: &Frame, at: Stamp) -> String {
     let at = at.wall.since_epoch();
     let data: String = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();

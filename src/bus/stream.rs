@@ -1,5 +1,5 @@
-//! A bus behind a byte stream: an adapter at a serial port, or a server on the network. The text on the stream is the
-//! matter of a [`Protocol`]; connecting, waiting and connecting again are the same for all.
+//! A bus behind a byte stream: an adapter at a serial port, or a server on the network. A [`Protocol`] handles the text
+//! on the stream. This module connects, waits and reconnects.
 
 use super::interrupt::Interrupts;
 use super::port::{Place, Port, Waitable, resolve, wait};
@@ -12,31 +12,31 @@ use std::time::{Duration, Instant};
 
 /// The longest wait for a TCP connection to one address.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
-/// The time between two attempts to connect again.
+/// The interval of attempts to reconnect.
 const RETRY_INTERVAL: Duration = Duration::from_millis(500);
-/// Bytes that the other side has not taken yet. More is a full transmit queue.
+/// The limit of unsent bytes. With more bytes, the transmit queue is full.
 const MAX_WAITING: usize = 16 * 1024;
 /// The longest wait for the last bytes when the bus is closed.
 const CLOSE_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// What a protocol has for the other side, and for the program.
+/// The output of a protocol for the other side, and for the program.
 #[derive(Debug, Default)]
 pub(super) struct Output {
     pub(super) bytes: Vec<u8>,
     pub(super) events: VecDeque<Event>,
 }
 
-/// The text that an adapter or server understands: a state machine without input, output and clock.
+/// The protocol of an adapter or server, as a state machine without I/O and clock.
 ///
-/// An error is the reason why the connection is of no use.
+/// An error is the reason why the connection cannot be used.
 pub(super) trait Protocol {
     /// Starts on a new connection.
     fn start(&mut self, now: Stamp, out: &mut Output);
 
-    /// Processes received bytes, cut at any place.
+    /// Processes received bytes, which arrive in pieces.
     fn receive(&mut self, bytes: &[u8], now: Stamp, out: &mut Output) -> Result<(), String>;
 
-    /// When [`Protocol::wake`] has something to do.
+    /// When [`Protocol::wake`] must be called.
     fn next_wake(&self) -> Option<Mono>;
 
     /// The moment of [`Protocol::next_wake`] was reached.
@@ -48,12 +48,12 @@ pub(super) trait Protocol {
     /// Whether frames can be sent and received.
     fn is_open(&self) -> bool;
 
-    /// Whether accepted frames are not in `out` yet.
+    /// Whether accepted frames still wait for `out`.
     fn is_busy(&self) -> bool {
         false
     }
 
-    /// Ends the connection in good order.
+    /// Closes the connection properly.
     fn close(&mut self, _out: &mut Output) {}
 
     fn timestamps(&self) -> TimestampSource;
@@ -71,8 +71,8 @@ pub(super) trait Protocol {
         Err(BusError::Unsupported("the bit rate of this bus cannot be set from here".to_owned()))
     }
 
-    /// Begins to set the bit rate and the mode; [`Protocol::is_open`] is true again when it is done. `None` closes the
-    /// channel.
+    /// Starts to set the bit rate and the mode. [`Protocol::is_open`] is true again when this is complete. `None`
+    /// closes the channel.
     fn set_channel(&mut self, _to: Option<(u32, Mode)>, _now: Stamp, _out: &mut Output) -> Result<(), BusError> {
         self.can_set_bit_rate()
     }
@@ -90,9 +90,9 @@ pub(super) trait Protocol {
 
 /// The connection.
 enum Link {
-    /// There is none until the next attempt.
+    /// No connection until the next attempt.
     Down(Mono),
-    /// It is being made, until this moment.
+    /// The connection is in progress, at most until this moment.
     Connecting(Port, Mono),
     Up(Port),
 }
@@ -110,7 +110,7 @@ pub(super) struct StreamBus<P: Protocol> {
     interrupts: Interrupts,
     opened: Instant,
     filters: Filters,
-    /// Whether the bus was usable when this was last reported.
+    /// The last reported state of the bus.
     is_up: bool,
     /// Why the last connection failed.
     failure: Option<String>,
@@ -150,7 +150,7 @@ impl<P: Protocol> StreamBus<P> {
         Ok(bus)
     }
 
-    /// Works until the protocol is open, or has failed at each address.
+    /// Waits until the protocol is open, or has failed at each address.
     fn until_open(&mut self) -> Result<(), BusError> {
         loop {
             if self.interrupts.take() {
@@ -168,7 +168,7 @@ impl<P: Protocol> StreamBus<P> {
         }
     }
 
-    /// Begins a connection to the next address.
+    /// Starts a connection to the next address.
     fn connect(&mut self) {
         let now = self.now();
         let opened = match &self.place {
@@ -187,7 +187,7 @@ impl<P: Protocol> StreamBus<P> {
         }
     }
 
-    /// Whether the connection is complete.
+    /// Checks whether the connection is complete.
     fn check_connection(&mut self, now: Stamp) {
         match std::mem::replace(&mut self.link, Link::Down(now.mono)) {
             Link::Connecting(port, until) => match port.connected() {
@@ -204,7 +204,8 @@ impl<P: Protocol> StreamBus<P> {
         }
     }
 
-    /// Gives the connection up. The next address of the host is tried at once, then all of them after a pause.
+    /// Closes the connection. The next address of the host is tried at once; after the last one, all again after a
+    /// pause.
     fn fail(&mut self, why: String) {
         let was_connecting = !matches!(self.link, Link::Up(_));
         self.failure = Some(why);
@@ -220,7 +221,7 @@ impl<P: Protocol> StreamBus<P> {
         }
     }
 
-    /// Waits for the other side, a signal or the deadline, and does what comes of it.
+    /// Waits for the other side, a signal or the deadline, and handles the event.
     fn step(&mut self, deadline: Mono) {
         self.flush();
         let due = match &self.link {
@@ -322,7 +323,7 @@ pub(super) fn printable(text: &str) -> String {
     text.chars().take(80).map(safe).collect()
 }
 
-/// The reason in words, without the number of the system.
+/// The text of an error, without the number of the system.
 fn plain(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::ConnectionRefused => "connection refused: no server listens there".to_owned(),

@@ -274,7 +274,7 @@ impl Command {
         }
     }
 
-    /// Whether the command only listens: an adapter then sends no acknowledge either.
+    /// Whether the command only listens. An adapter then sends no acknowledgement.
     fn listens_only(&self) -> bool {
         match self {
             Command::Scan(scan) => scan.passive,

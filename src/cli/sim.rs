@@ -48,7 +48,7 @@ impl Sim {
     }
 }
 
-/// A server of which the devices are the bus.
+/// Serves the devices as a bus to the clients of a server.
 fn serve(global: &Global, address: Address) -> anyhow::Result<Box<dyn Bus>> {
     if global.bus.is_some() {
         return Err(ErrorMessage::usage("--listen serves the devices in place of a bus: omit --bus").into());

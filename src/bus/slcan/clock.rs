@@ -1,14 +1,14 @@
-//! The clock of an adapter: milliseconds that start again each minute.
+//! The clock of an adapter: milliseconds that restart at 0 each minute.
 
 use crate::bus::Mono;
 use std::time::Duration;
 
-/// Continues the milliseconds of an adapter beyond their end.
+/// Converts the milliseconds of an adapter to a time that does not restart.
 #[derive(Debug)]
 pub(super) struct MinuteClock {
-    /// The number of milliseconds after which the adapter starts again.
+    /// The number of milliseconds after which the clock restarts.
     period: u32,
-    /// The last reading, when it came, and the time since the first one.
+    /// The last reading, its receive time, and the time since the first reading.
     last: Option<(u32, Mono, Duration)>,
 }
 
@@ -23,7 +23,7 @@ impl MinuteClock {
     pub(super) fn continued(&mut self, reading: u16, now: Mono) -> Duration {
         let reading = u32::from(reading);
         if reading >= self.period {
-            // Some firmware uses all 16 bits.
+            // The clock of some firmware restarts after 16 bits.
             *self = MinuteClock { period: 0x1_0000, last: None };
         }
         let time = match self.last {
@@ -31,7 +31,7 @@ impl MinuteClock {
             Some((before, at, time)) => {
                 let period = Duration::from_millis(u64::from(self.period));
                 let step = Duration::from_millis(u64::from((reading + self.period - before) % self.period));
-                // A frame may wait for half a minute before it arrives, so the whole minutes are rounded.
+                // A frame may arrive up to half a minute late, so the number of minutes is rounded.
                 let minutes = (now.since(at) + period / 2).saturating_sub(step).as_nanos() / period.as_nanos();
                 time + step + period * u32::try_from(minutes).unwrap_or(u32::MAX)
             }
@@ -56,7 +56,7 @@ mod tests {
     #[test]
     fn minutes_are_continued() {
         assert_eq!(times(&[(0, 59_990), (25, 5), (60_030, 15), (250_000, 10_000)]), [0, 15, 60_025, 250_010]);
-        // A frame that arrived late, and one that arrived early after it.
+        // A late frame, followed by an early one.
         assert_eq!(times(&[(0, 100), (900, 200), (900, 950), (1000, 1000)]), [0, 100, 850, 900]);
     }
 

@@ -1,4 +1,4 @@
-//! What an adapter can do, from its answers to `V`, `v` and `N`.
+//! The features of an adapter, from its answers to `V`, `v` and `N`.
 
 use std::fmt;
 
@@ -13,23 +13,23 @@ pub(super) struct Firmware {
     pub(super) serial: Option<String>,
 }
 
-/// Firmware whose commands are known.
+/// The kinds of firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// LAWICEL CAN232 and CANUSB: no `v`. USBtin: all three answers.
+    /// LAWICEL CAN232 and CANUSB do not answer `v`. USBtin answers all three commands.
     Lawicel,
-    /// CANable and its relatives (normaldotcom/canable-fw).
+    /// CANable and similar adapters (normaldotcom/canable-fw).
     Canable,
-    /// Any other: only the commands that all have in common.
+    /// Other firmware. Only common commands are used.
     Unknown,
 }
 
-/// How the channel is opened without sending acknowledges.
+/// The command for opening the channel without acknowledgements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ListenOnly {
-    /// By `L` in place of `O`.
+    /// `L` instead of `O`.
     OtherOpen,
-    /// By `M1` before `O`.
+    /// `M1` before `O`.
     SilentMode,
 }
 

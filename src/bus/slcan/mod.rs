@@ -1,8 +1,8 @@
-//! Serial adapters that speak the LAWICEL protocol (slcan): CANable, CANtact, USBtin, CAN232, WiFi bridges.
+//! Serial adapters with the LAWICEL protocol (slcan): CANable, CANtact, USBtin, CAN232, WiFi bridges.
 //!
-//! Such adapters differ: some answer each command, some answer none, some need two seconds after they were opened, and
-//! many lose what comes before they have answered. So one command is under way at a time. An adapter that does not
-//! answer gets its frames no faster than the bus can carry them.
+//! The adapters differ. Some answer each command, and some answer none. Some need two seconds after opening. Many lose
+//! commands that arrive before the previous answer, so the next command waits for the answer. For an adapter that does
+//! not answer, frames are paced to the bit rate.
 
 mod clock;
 mod firmware;
@@ -19,33 +19,33 @@ use std::collections::VecDeque;
 use std::time::Duration;
 use text::{Answer, Lines, command};
 
-/// How long an adapter may take before its first answer: some start anew when the port is opened.
+/// The longest wait for the first answer. Some adapters restart when the port is opened.
 const WAKE_TIMEOUT: Duration = Duration::from_millis(2500);
-/// The time between two attempts to get a first answer.
+/// The interval of attempts to get a first answer.
 const WAKE_INTERVAL: Duration = Duration::from_millis(250);
 /// After the first answer, answers to earlier attempts may follow within this time.
 const QUIET_TIME: Duration = Duration::from_millis(60);
 /// The longest wait for an answer to a command.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(300);
-/// The time between commands to an adapter that answers nothing.
+/// The time between commands to an adapter that does not answer.
 const BLIND_INTERVAL: Duration = Duration::from_millis(30);
-/// The time between attempts to send a frame that the adapter rejected.
+/// The interval of attempts to send a rejected frame.
 const RETRY_INTERVAL: Duration = Duration::from_millis(5);
-/// A frame that was rejected this often is given up.
+/// A frame is dropped after this number of rejections.
 const MAX_TRIES: u32 = 40;
 /// Frames that wait for the adapter.
 const MAX_QUEUED: usize = 64;
-/// The time between two questions for the error flags.
+/// The interval of reads of the error flags.
 const FLAGS_INTERVAL: Duration = Duration::from_secs(1);
 
-/// A command while the adapter is set up.
+/// A step of the set-up of the adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
     Close,
     Version,
     Detail,
     Serial,
-    /// Checks whether the adapter can do what is asked of it.
+    /// Checks whether the adapter supports the requested channel.
     Decide,
     Rate(u8),
     Stamps,
@@ -82,14 +82,14 @@ enum Stage {
     Working,
 }
 
-/// The command that is under way.
+/// The command without an answer so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Pending {
     Step(Step),
     Frame,
 }
 
-/// The host's side of the LAWICEL protocol.
+/// The host side of the LAWICEL protocol.
 #[derive(Debug)]
 pub(super) struct Slcan {
     /// The bit rate in bit/s and the mode of the channel; `None` if it is closed.
@@ -99,24 +99,24 @@ pub(super) struct Slcan {
     stage: Stage,
     steps: VecDeque<Step>,
     pending: Option<Pending>,
-    /// When something has to be done without an answer.
+    /// The time-out of the present wait.
     due: Option<Mono>,
     /// The earliest moment for the next frame.
     not_before: Mono,
-    /// When the adapter is asked for its error flags.
+    /// The time of the next read of the error flags.
     next_flags: Mono,
     lines: Lines,
     firmware: Firmware,
     /// Whether the adapter answers commands.
     answers: bool,
-    /// Whether it answers frames; `None` if that is not known yet.
+    /// Whether the adapter answers frames; `None` if still unknown.
     answers_frames: Option<bool>,
     has_stamps: bool,
     /// The error flags, if the adapter reports them.
     flags: Option<u8>,
     queue: VecDeque<Frame>,
     tries: u32,
-    /// Whether the channel is being changed: a rejected bit rate is then no reason to disconnect.
+    /// Whether the channel is being changed. A rejected bit rate then does not end the connection.
     is_retiming: bool,
     refusal: Option<String>,
     clock: MinuteClock,
@@ -150,7 +150,7 @@ impl Slcan {
         }
     }
 
-    /// The commands that open the channel, or why the adapter cannot be asked for it.
+    /// The commands that open the channel, or the reason why this is not possible.
     fn opening(&self) -> Result<Vec<Step>, String> {
         let Some((bit_rate, mode)) = self.channel else { return Ok(Vec::new()) };
         let digit = self.firmware.rate_digit(bit_rate).ok_or_else(|| {
@@ -181,7 +181,7 @@ impl Slcan {
         self.steps = questions.into_iter().filter(|_| self.answers).chain([Step::Decide]).collect();
     }
 
-    /// The answer to a step, or none in time.
+    /// Handles the answer to a step; `None` after the time-out.
     fn finish(&mut self, step: Step, answer: Option<Answer>) -> Result<(), String> {
         let text = match &answer {
             Some(Answer::Text(text)) => Some(text.clone()),
@@ -212,7 +212,7 @@ impl Slcan {
         Ok(())
     }
 
-    /// Sends what comes next, if nothing is under way.
+    /// Sends the next command or frame, unless an answer is pending.
     fn advance(&mut self, now: Stamp, out: &mut Output) -> Result<(), String> {
         while self.stage == Stage::Working && self.pending.is_none() && self.due.is_none_or(|due| due <= now.mono) {
             self.due = None;
@@ -235,7 +235,7 @@ impl Slcan {
                     return Ok(());
                 }
                 self.write(&command(&frame), out);
-                // The bus cannot carry frames faster, and adapters that do not answer lose what comes earlier.
+                // Adapters that do not answer lose frames that are sent faster than the bus carries them.
                 let pace = frame_time(&frame, self.bit_rate).max(Duration::from_millis(1));
                 if self.answers_frames == Some(false) {
                     self.queue.pop_front();
@@ -272,7 +272,7 @@ impl Slcan {
                     out.events.push_back(Event::Frame(Received { frame, at }));
                 }
             }
-            // A stretch of bytes that cannot be read is one event.
+            // Consecutive invalid bytes are one event.
             Answer::Garbage if self.is_open() => out.events.push_back(Event::Fault(Fault::Garbled, now)),
             Answer::Garbage => {}
             _ if self.stage != Stage::Working => {
@@ -290,7 +290,7 @@ impl Slcan {
                 Some(Pending::Frame) if matches!(answer, Answer::Text(_)) => self.pending = Some(Pending::Frame),
                 Some(Pending::Frame) => self.frame_answered(&answer, now, out),
                 None if matches!(answer, Answer::Text(_)) => out.events.push_back(Event::Fault(Fault::Garbled, now)),
-                // An answer that came late.
+                // A late answer.
                 None => {}
             },
         }
@@ -314,7 +314,7 @@ impl Slcan {
         }
     }
 
-    /// Reports error flags that are new. The states of the controller are reported when they change.
+    /// Reports new error flags. States of the controller are reported when they change.
     fn report_flags(&mut self, before: Option<u8>, now: Stamp, out: &mut Output) {
         let Some(flags) = self.flags else { return };
         let new = flags & !before.unwrap_or(0);
@@ -346,7 +346,7 @@ impl Protocol for Slcan {
         *self = Slcan::new(self.bit_rate, mode);
         self.stage = Stage::Waking(now.mono + WAKE_TIMEOUT);
         self.due = Some(now.mono + WAKE_INTERVAL);
-        // The first end of line completes what an earlier program may have left.
+        // The first end of line completes an unfinished command of an earlier program.
         out.bytes.extend(b"\rC\r");
     }
 
@@ -360,7 +360,7 @@ impl Protocol for Slcan {
         });
         self.lines = lines;
         result?;
-        // After all of them: some firmware sends more than one character for one answer.
+        // Called after all answers, because some firmware sends more than one character for an answer.
         self.advance(now, out)
     }
 
@@ -397,7 +397,7 @@ impl Protocol for Slcan {
         }
         self.queue.push_back(*frame);
         if self.pending.is_none() {
-            // The next question about the flags does not hold a frame back.
+            // The next read of the flags must not delay a frame.
             self.due = None;
         }
         self.advance(now, out).map_err(BusError::Unsupported)

@@ -8,19 +8,19 @@ fn at(mono: Duration) -> Stamp {
 /// An adapter written from the command set of the LAWICEL manuals.
 #[derive(Clone, Default)]
 struct Adapter {
-    /// Answers nothing at all.
+    /// Whether the adapter never answers.
     is_mute: bool,
-    /// Ends its answers with this.
+    /// The end of each answer.
     end: &'static str,
-    /// Ignores what comes before this moment.
+    /// Input before this moment is ignored.
     starts_at: Duration,
     /// Answers to `V`, `v` and `N`; empty for a rejection.
     version: [&'static str; 3],
-    /// Commands that it rejects.
+    /// Rejected commands.
     rejects: Vec<&'static str>,
-    /// Rejects the next frames.
+    /// The number of next frames that are rejected.
     is_full_for: u32,
-    /// Loses commands that come while it is busy with another one.
+    /// The time after a command in which further commands are lost.
     busy: Duration,
     busy_until: Duration,
     input: Vec<u8>,
@@ -72,7 +72,7 @@ impl Adapter {
     }
 }
 
-/// The protocol and an adapter on a virtual clock. Bytes take no time.
+/// The protocol and an adapter on a virtual clock. Transmission takes no time.
 struct Bench {
     slcan: Slcan,
     adapter: Adapter,
@@ -283,7 +283,7 @@ fn unplugged_adapter_is_found_again() {
                 host.write_all(&answer).expect("written");
             }
             host.write_all(frame).expect("written");
-            // Until the other end has read it.
+            // Waits until the other end has read the bytes.
             std::thread::sleep(Duration::from_millis(200));
         })
     };

@@ -6,7 +6,7 @@ use crate::canopen::id::CanId;
 /// The longest line: an extended frame with eight bytes and a time stamp. Answers to `V` can be longer.
 const MAX_LINE: usize = 128;
 
-/// What an adapter sends.
+/// A message of an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
     /// `\r`, `z\r` or `Z\r`: the command was executed.
@@ -15,17 +15,17 @@ pub(super) enum Answer {
     Rejected,
     /// A frame, with the milliseconds of the adapter's clock if it has one.
     Frame(Frame, Option<u16>),
-    /// Another line: the answer to a question.
+    /// Another line: the answer to a query.
     Text(String),
-    /// Bytes that are no line.
+    /// Bytes that are not a line.
     Garbage,
 }
 
-/// Finds lines in a stream of bytes that is cut at any place.
+/// Finds lines in a stream of bytes that arrive in pieces.
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     line: Vec<u8>,
-    /// Whether the present line is too long or has bytes that no line has.
+    /// Whether the present line is too long or has invalid bytes.
     is_garbage: bool,
 }
 
@@ -45,7 +45,7 @@ impl Lines {
                     self.line.clear();
                     found(Answer::Rejected);
                 }
-                // Some firmware ends its lines with both.
+                // Some firmware ends its lines with CR and LF.
                 b'\n' => {}
                 b' '..=b'~' if self.line.len() < MAX_LINE => self.line.push(byte),
                 _ => self.is_garbage = true,

@@ -87,7 +87,7 @@ fn a_line_without_end_takes_no_memory() {
 #[test]
 fn time_of_the_server_is_an_offset() {
     let (mut client, mut out) = (open_client(), Output::default());
-    // The clock of the server is 20 years behind. Frames take 1 ms, the second one 9 ms.
+    // The clock of the server is 20 years behind. Transmission takes 1 ms, for the second frame 9 ms.
     for (arrived, sent) in [(1001, "800000001.000000"), (2009, "800000002.000000"), (3001, "800000003.000000")] {
         let text = format!("< frame 185 {sent} 11 >");
         client.receive(text.as_bytes(), at(Duration::from_millis(arrived)), &mut out).expect("received");

@@ -55,8 +55,7 @@ impl File {
     }
 }
 
-/// Adds to a file what an interrupted run may have switched off for its writes: the PDOs and services that were on
-/// before it, unless the file itself names them.
+/// Adds the PDOs and services to a file that an interrupted run may have switched off, unless the file contains them.
 pub fn resume(document: &mut Document, before: &Document) {
     let is_switch = |key: &str| key.ends_with(".enabled") || key.ends_with("-producer");
     let switches = before.entries.iter().filter(|entry| is_switch(&entry.key));

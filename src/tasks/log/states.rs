@@ -18,7 +18,7 @@ const MAX_HEARTBEAT_PERIOD: Duration = Duration::from_secs(2);
 /// The interval of checks whether the last commands were sent.
 const SEND_INTERVAL: Duration = Duration::from_millis(10);
 
-/// How long heartbeats are awaited that confirm the previous states.
+/// The wait for heartbeats that confirm the previous states.
 const CONFIRMATION_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// The nodes that were started, and their previous states.
