@@ -111,7 +111,7 @@ fn invalid_bus_names_are_refused() {
     let bench = Bench::of(ALL);
     let run = |bus: &str| bench.finish(&mut bench.command(&["-b", bus, "scan"]));
     run("foo:bar")
-        .refuses("\"foo:bar\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE)");
+        .refuses("\"foo:bar\" is not a bus (can0, socketcan:can0, socketcand://HOST/can0, slcan:/dev/ttyACM0@250k, sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE)");
     run("").refuses("\"\" is not the name of an interface");
     run("a-name-that-is-too-long").refuses("\"a-name-that-is-too-long\" is not the name of an interface");
     run("sim:mh4").refuses("\"mh4\" is neither DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) nor a file (FILE.toml)");

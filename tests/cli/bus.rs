@@ -75,6 +75,6 @@ fn single_sensor_is_asked_only_with_active() {
     assert!(first.is_some_and(|line| line.starts_with("cangauge: sim: ")), "{}", done.stderr);
     assert!(done.stderr.contains("only with a single device: cangauge bus detect sim --active"), "{}", done.stderr);
     let done = bench.run("bus detect --active").prints("100000\n");
-    assert!(done.stderr.contains("no valid frame: now asking"), "{}", done.stderr);
+    assert!(done.stderr.contains("no valid frame; now sending requests"), "{}", done.stderr);
     assert!(done.frames.contains(&"606#4000100000000000".to_owned()));
 }

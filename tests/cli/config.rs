@@ -398,7 +398,7 @@ fn a_wrong_table_is_refused_before_anything_is_sent() {
     std::fs::write(bench.path("f.toml"), "[device]\nkind = \"mh4\"\n[node]\nheartbeat = \"{beat}\"\n").expect("a file");
     for (table, message) in [
         ("vendor,serial\n1,2\n", "t.csv:1: no column \"product\""),
-        ("vendor,product,serial,beat\n71,1,0,500ms\n", "t.csv:2: serial: devices with the serial number 0"),
+        ("vendor,product,serial,beat\n71,1,0,500ms\n", "t.csv:2: serial: the number 0 does not identify a device"),
         ("vendor,product,serial,beat\n71,x,5,500ms\n", "t.csv:2: product: \"x\" is not a number"),
         ("vendor,product,serial,beat\n71,1,5,500ms\n71,1,5,500ms\n", "t.csv:3: the device with the serial number 5"),
         ("vendor,product,serial,node,beat\n71,1,5,9,1s\n71,1,6,9,1s\n", "t.csv:3: node: two devices get the node-ID 9"),

@@ -44,7 +44,11 @@ fn an_eds_of_another_device_is_a_warning_or_an_error() {
         ] {
             let line = line.replace('\'', "");
             let done = run(&line).exit(2);
-            assert!(done.stderr.contains("or use this one anyway: --accept-mismatch"), "{line}: {}", done.stderr);
+            assert!(
+                done.stderr.contains("choose the file of this device, or add --accept-mismatch"),
+                "{line}: {}",
+                done.stderr
+            );
             assert!(done.frames_of("601").iter().all(|data| data.starts_with("40")), "{line}: {:?}", done.frames);
         }
         let done = run("sdo write 1 0x1017 100 --accept-mismatch").exit(0);

@@ -152,7 +152,7 @@ fn silence_advice(node: NodeId, waited: Duration, started: bool, missed: MissedA
             .then(|| format!("if it answers with another COB-ID, add: --sdo {node}=0xTX:0x{}", frame.id()));
     }
     Some(match missed.state {
-        Some(NmtState::Stopped) => format!("a stopped node does not answer SDO:  cangauge nmt preop {node}"),
+        Some(NmtState::Stopped) => format!("a stopped node does not answer SDO: cangauge nmt preop {node}"),
         _ if missed.has_answered || started => {
             format!(
                 "the node answered before: allow it more time with -t {}",

@@ -41,7 +41,7 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
         LssCause::NotTheOnly(sign) => {
             let names = cause.device.node.map_or_else(|| "node-ID".to_owned(), |node| format!("node-ID ({node})"));
             Words::new(another(sign))
-                .hint(format!("use the {names} or the identity of one device; list them:  cangauge lss scan"))
+                .hint(format!("use the {names} or the identity of one device; list them: cangauge lss scan"))
         }
         LssCause::NoDevice => Words::new("no device answers by SDO or LSS")
             .hint("check power, wiring and bit rate; find the cause: cangauge doctor all"),
@@ -89,7 +89,7 @@ fn duplicate_node_id(sign: DuplicateSign) -> Words {
     match sign {
         DuplicateSign::OtherMaster => Words::new(words).hint("stop the other program, or try again"),
         _ => Words::new(format!("{words}: several devices probably have this node-ID")).hint(
-            "connect one device at a time, or use the identity on its label:  \
+            "connect one device at a time, or use the identity on its label: \
              cangauge lss set-id VENDOR:PRODUCT:REVISION:SERIAL NEW",
         ),
     }

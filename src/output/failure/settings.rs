@@ -11,7 +11,7 @@ use crate::tasks::settings::{QuantityError, SettingsEffect, SettingsFact, Settin
 pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> Words {
     match cause {
         SettingsFailure::WhichSignal { available } => {
-            Words::new(format!("choose a signal (it has:  {})", available.join(", ")))
+            Words::new(format!("choose a signal (it has: {})", available.join(", ")))
         }
         SettingsFailure::NoErrorObjects => {
             Words::new("it has neither an error register (1001h) nor an error history (1003h)")

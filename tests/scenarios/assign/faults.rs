@@ -99,7 +99,7 @@ fn silent_lss_uses_the_objects_of_the_description() {
     let silent = format!(", lss = {{ lose = {:?} }}", [0x43; 16]);
     let mut bus = bus(&bench("mh4", &silent));
     let done = run(&mut bus, "5", &id(12));
-    assert!(done.warns("its own objects are used instead"), "{:?}", done.notes);
+    assert!(done.warns("its objects are used instead"), "{:?}", done.notes);
     done.result.unwrap();
     assert_eq!(all_snapshots(&bus)[0].2, Some(12));
     // Not if the user chose LSS. The hint contains the identity.
