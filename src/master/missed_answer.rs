@@ -37,6 +37,8 @@ pub(super) struct MissedAnswers {
     time_without_answer: Duration,
     /// The object of each request without an answer so far, and another frame that was received instead.
     open: BTreeMap<NodeId, (ObjectId, Option<Frame>)>,
+    /// The last request of another master to each node.
+    foreign_requests: BTreeMap<NodeId, ObjectId>,
     /// Nodes whose request was repeated. Their answers may have another COB-ID.
     repeated: BTreeSet<NodeId>,
 }
@@ -94,9 +96,10 @@ impl MissedAnswers {
         if frame.id().sdo_request_node().is_some() {
             // Another master uses the channel: the frames may be its answers.
             self.open.remove(&node);
+            self.foreign_requests.extend(object_of(frame).map(|object| (node, object)));
         } else if let Some((_, candidate)) = self.open.get_mut(&node) {
             candidate.get_or_insert(*frame);
-        } else if !self.answered.contains(&node) {
+        } else if !self.answered.contains(&node) && self.foreign_requests.get(&node).copied() != object_of(frame) {
             self.on_other_cob_id(frame, now);
         }
     }
@@ -115,14 +118,20 @@ impl MissedAnswers {
             }
             return;
         }
-        let [0x41..=0x43 | 0x47 | 0x4b | 0x4f | 0x60 | 0x80, a, b, c, _, _, _, _] = *frame.data() else { return };
-        let object = ObjectId::from_multiplexer([a, b, c]);
+        let [0x41..=0x43 | 0x47 | 0x4b | 0x4f | 0x60 | 0x80, ..] = *frame.data() else { return };
+        let Some(object) = object_of(frame) else { return };
         for (asked, candidate) in self.open.values_mut() {
             if *asked == object {
                 candidate.get_or_insert(*frame);
             }
         }
     }
+}
+
+/// The object in the first frame of a transfer.
+fn object_of(frame: &Frame) -> Option<ObjectId> {
+    let [_, a, b, c, _, _, _, _] = *frame.data() else { return None };
+    Some(ObjectId::from_multiplexer([a, b, c]))
 }
 
 #[cfg(test)]
@@ -156,6 +165,7 @@ mod tests {
             assert_eq!(missed(&other.parse::<Frame>().map(|_| vec![other]).unwrap_or_default()).frame, None, "{other}");
         }
         assert_eq!(missed(&["605#4018100100000000", "585#4318100147000000"]).frame, None, "another master's");
+        assert_eq!(missed(&["606#4017100000000000", "586#4B171000F4010000"]).frame, None, "asked by another master");
         assert_eq!(missed(&["705#04"]).state, Some(NmtState::Stopped));
         assert_eq!(missed(&["705#04", "705#00"]).state, None);
     }
