@@ -22,6 +22,7 @@ use crate::tasks::{Failure, Kind};
 use clap::Args;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::time::Duration as StdDuration;
 
 /// Check measurements against limits (exit code 0: all satisfied, 1: not satisfied, 3: no data)
 ///
@@ -76,8 +77,10 @@ impl Check {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         refuse_to_send(global, self.sync.or(self.poll))?;
         self.validate(global)?;
-        let file = self.junit.as_deref().map(|path| ReportFile::create(path, false)).transpose()?;
-        let report = match self.measure(global) {
+        let limit = self.duration.map(|duration| duration.0);
+        let file = self.junit.as_deref().map(|path| ReportFile::create(path, false, limit)).transpose()?;
+        let waited = file.as_ref().map_or(StdDuration::ZERO, |file| file.waited);
+        let report = match self.measure(global, waited) {
             // A CI server also needs a report if nothing was measured.
             Err(error) if file.is_some() => {
                 let failure = error.downcast_ref::<Failure>().filter(|failure| failure.kind() != Kind::Usage);
@@ -120,8 +123,9 @@ impl Check {
         }
     }
 
-    fn measure(&self, global: &Global) -> anyhow::Result<CheckReport> {
-        let duration = self.duration.map(|duration| duration.0);
+    /// `waited` is the part of the time that has passed.
+    fn measure(&self, global: &Global, waited: StdDuration) -> anyhow::Result<CheckReport> {
+        let duration = self.duration.map(|duration| duration.0.saturating_sub(waited));
         let progress = CheckProgress::new(duration.is_some() && global.shows_progress(), duration.unwrap_or_default());
         let console = Console { progress: Some(progress.multi()), ..global.console() };
         global.with_claims(|master, claims| {

@@ -154,22 +154,21 @@ pub(super) struct ReportFile {
     _replaced: Option<File>,
     /// The whole lines of the existing report, if it is continued.
     before: Vec<u8>,
+    /// How long opening it waited for the reader of a FIFO.
+    pub(super) waited: Duration,
 }
 
 impl ReportFile {
-    /// Opens the file with its temporary name. With `append`, the new report follows the existing one.
-    pub(super) fn create(path: &Path, append: bool) -> anyhow::Result<ReportFile> {
+    /// Opens the file with its temporary name. With `append`, the new report follows the existing one. It waits for the
+    /// reader of a FIFO, not longer than `limit`.
+    pub(super) fn create(path: &Path, append: bool, limit: Option<Duration>) -> anyhow::Result<ReportFile> {
         let is_regular = path.metadata().map_or(true, |metadata| metadata.is_file());
         let mut options = OpenOptions::new();
         if is_own_stream(path) || !is_regular {
+            let (waited, _reader) = wait_for_reader(path, limit).map_err(|source| no_reader(path, source))?;
             let file = options.append(true).open(path).map_err(|source| file_error("open", path, source))?;
-            return Ok(ReportFile {
-                path: path.to_owned(),
-                file,
-                temporary: None,
-                _replaced: None,
-                before: Vec::new(),
-            });
+            let (path, before) = (path.to_owned(), Vec::new());
+            return Ok(ReportFile { path, file, temporary: None, _replaced: None, before, waited });
         }
         // A link is kept, and its target replaced.
         let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -196,7 +195,7 @@ impl ReportFile {
             }
         };
         file.set_len(0).map_err(|source| file_error("create", &path, source))?;
-        Ok(ReportFile { path, file, temporary: Some(temporary), _replaced: replaced, before })
+        Ok(ReportFile { path, file, temporary: Some(temporary), _replaced: replaced, before, waited: Duration::ZERO })
     }
 
     /// Writes the whole report.
@@ -237,7 +236,7 @@ pub(super) fn lock_output(file: &File, path: &Path) -> Result<(), ErrorMessage> 
 }
 
 /// Why a FIFO was not opened.
-fn no_reader(path: &Path, source: io::Error) -> anyhow::Error {
+pub(super) fn no_reader(path: &Path, source: io::Error) -> anyhow::Error {
     let name = path.display();
     match source.kind() {
         io::ErrorKind::TimedOut => ErrorMessage::new(Kind::Io, format!("open {name}: no program reads from this FIFO"))

@@ -3,9 +3,10 @@
 use super::Global;
 use super::args::{BusSpec, Channel, Nodes};
 use super::exit::{FileError, IntoFailure};
-use super::file::lock_output;
+use super::file::{lock_output, no_reader};
 use crate::bus::channels::{SdoChannel, SdoChannels};
 use crate::bus::claim::{Claim, ClaimError, Claims, IfHeld, Part};
+use crate::bus::file::wait_for_reader;
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
 use crate::bus::remote::Use;
@@ -31,6 +32,9 @@ const WAIT_INTERVAL: Duration = Duration::from_millis(200);
 
 /// The longest wait for another program that uses the same nodes.
 const CLAIM_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// The longest wait for the reader of a trace that is a FIFO. The claims are held meanwhile.
+const TRACE_READER_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The bus given by the options, or else the only CAN interface that is up.
 pub(super) fn spec(global: &Global) -> anyhow::Result<BusSpec> {
@@ -119,6 +123,7 @@ fn trace_output(path: &Path) -> anyhow::Result<(Box<dyn Write>, String)> {
     }
     let name = path.display().to_string();
     let failed = |source| FileError { what: format!("write trace {name}"), source };
+    let (_, _reader) = wait_for_reader(path, Some(TRACE_READER_TIMEOUT)).map_err(|source| no_reader(path, source))?;
     let file = File::options().append(true).create(true).open(path).map_err(failed)?;
     lock_output(&file, path)?;
     if file.metadata().is_ok_and(|metadata| metadata.is_file()) {

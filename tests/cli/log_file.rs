@@ -184,9 +184,13 @@ fn fifo_without_a_reader_is_waited_for_within_the_duration() {
     let bench = Bench::of("mh4@1");
     let made = std::process::Command::new("mkfifo").arg(bench.path("fifo")).status().expect("mkfifo");
     assert!(made.success());
-    for output in ["-o fifo", "-o run.csv --force --events fifo"] {
+    let log = "log 1 --sync 10ms --duration 300ms";
+    let check = "check 1 pressure<99 --sync 10ms --for 300ms --junit fifo";
+    let outputs = ["-o fifo", "-o run.csv --force --events fifo", "-o run.csv --force --summary fifo"];
+    let lines = outputs.map(|output| format!("{log} {output}")).into_iter();
+    for line in lines.chain([check.to_owned(), format!("{log} -o run.csv --force --trace fifo")]) {
         let start = std::time::Instant::now();
-        let done = bench.run(&format!("log 1 --sync 10ms --duration 300ms {output}"));
+        let done = bench.run(&line);
         done.fails(8, "cangauge: open fifo: no program reads from this FIFO\nhint: start the reader first: cat fifo\n");
         assert!(start.elapsed() >= std::time::Duration::from_millis(300));
     }

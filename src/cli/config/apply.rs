@@ -120,7 +120,7 @@ impl Apply {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let record = self.record.as_ref().map(|path| ReportFile::create(path, false)).transpose()?;
+        let record = self.record.as_ref().map(|path| ReportFile::create(path, false, None)).transpose()?;
         let (asked, (bus, time), (done, failures)) = match &self.table {
             Some(table) => self.by_table(global, table)?,
             None => self.by_nodes(global)?,

@@ -260,7 +260,12 @@ impl Files {
         }
         self.open_events(&mut opened, limit)?;
         let summary = self.summary.as_ref().filter(|path| path.as_path() != Path::new("-"));
-        opened.summary = summary.map(|path| ReportFile::create(path, self.append)).transpose()?;
+        if let Some(path) = summary {
+            let left = limit.map(|limit| limit.saturating_sub(opened.waited));
+            let file = ReportFile::create(path, self.append, left)?;
+            opened.waited += file.waited;
+            opened.summary = Some(file);
+        }
         Ok(opened)
     }
 
