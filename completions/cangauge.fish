@@ -843,6 +843,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l passive -d 'Listen without sending anything; show state and identity, as far as other masters have read it'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l ignore-lock -d 'Continue although another program uses the same nodes'
@@ -867,6 +868,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l passive -d 'Listen without sending anything; show state and identity, as far as other masters have read it'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l pace -d 'Replay a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l ignore-lock -d 'Continue although another program uses the same nodes'
@@ -1534,6 +1536,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s v -l verbo
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l listen -d 'Serve the devices at this TCP port to other programs, as a socketcand server, in place of a bus. Without an address, only programs on this computer can connect' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l state -d 'Keep what the devices store, and their node-IDs, in this file for the next run' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s b -l bus -d 'Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r

@@ -97,7 +97,7 @@ const PRINTING: [&str; 5] = ["print", "println", "eprint", "eprintln", "dbg"];
 /// The files with `unsafe`: how often it occurs, and why.
 const UNSAFE: &[(&str, usize, &str)] = &[
     ("bus/claim/holder.rs", 1, "SO_PEERCRED: std has no stable call for the credentials of a peer"),
-    ("bus/interrupt.rs", 1, "sigaction: std cannot read the action of a signal"),
+    ("bus/interrupt.rs", 2, "sigaction and signal: std can neither read nor set the action of a signal"),
     ("bus/poll.rs", 2, "ppoll and poll: std cannot wait for a descriptor"),
     ("bus/replay/text.rs", 2, "mktime and its zeroed argument: std knows no time zones"),
     ("bus/socketcan/receive.rs", 3, "recvmmsg and its zeroed headers: no safe crate returns the drop counter"),

@@ -59,6 +59,32 @@ impl Interrupts {
     }
 }
 
+/// Reads lines from stdin in a thread. Each is followed by an interrupt, which wakes a program that waits on a bus. Call
+/// it when the bus is open.
+pub fn lines_with_interrupts() -> std::sync::mpsc::Receiver<String> {
+    let (sender, lines) = std::sync::mpsc::channel();
+    ignore_background_reads();
+    std::thread::spawn(move || {
+        for line in io::stdin().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() || low_level::raise(SIGINT).is_err() {
+                return;
+            }
+        }
+    });
+    lines
+}
+
+/// From now on, reading the terminal in the background is an error; it does not stop the process.
+#[cfg(unix)]
+#[expect(unsafe_code, reason = "the standard library cannot set the action of a signal")]
+fn ignore_background_reads() {
+    // SAFETY: SIG_IGN is a valid action, and no handler of this program is for this signal.
+    unsafe { libc::signal(libc::SIGTTIN, libc::SIG_IGN) };
+}
+
+#[cfg(not(unix))]
+fn ignore_background_reads() {}
+
 /// Makes a write beyond the file size limit (SIGXFSZ) fail like a write to a full disk, from now on.
 ///
 /// # Errors

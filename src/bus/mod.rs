@@ -338,6 +338,9 @@ pub enum BusError {
     /// Another cangauge process uses the same nodes or the whole bus.
     #[error("{0}")]
     InUse(String),
+    /// The transport carries no remote frames.
+    #[error("socketcand carries no remote frames (RTR)")]
+    NoRemoteFrames,
     /// This bus can only receive.
     #[error("{0} can only receive")]
     ReceiveOnly(String),

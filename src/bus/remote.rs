@@ -121,17 +121,15 @@ fn slcan(text: &str) -> Result<(Place, u32), String> {
     };
     let Some((device, rate)) = text.rsplit_once('@').filter(|(device, rate)| !device.is_empty() && !rate.is_empty())
     else {
-        return Err(format!(
-            "slcan:{text} needs the bit rate of the bus, for example slcan:{}@250k",
-            text.trim_end_matches('@')
-        ));
+        let device = text.trim_end_matches('@');
+        return Err(format!("\"slcan:{text}\" has no bit rate; add that of the bus: slcan:{device}@250k"));
     };
     let rate = bit_rate(rate)?;
     let place = match device.strip_prefix("tcp://") {
         Some(host) if speed.is_none() => {
             tcp(host, None).ok_or_else(|| format!("\"slcan:{text}\" is not slcan:tcp://HOST:PORT@RATE"))?
         }
-        Some(_) => return Err("serial= is for a serial port, not for TCP".to_owned()),
+        Some(_) => return Err(format!("\"slcan:{text}\": serial= is for a serial port, not for TCP")),
         None => {
             let speed = match speed {
                 Some(speed) => speed.parse().ok().filter(|speed| *speed > 0),

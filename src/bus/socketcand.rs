@@ -247,7 +247,7 @@ impl Protocol for Client {
 
     fn send(&mut self, frame: &Frame, _: Stamp, out: &mut Output) -> Result<(), BusError> {
         if frame.is_remote() {
-            return Err(BusError::Unsupported("socketcand cannot send remote frames (RTR)".to_owned()));
+            return Err(BusError::NoRemoteFrames);
         }
         let mut text = format!("< send {} {} ", frame.id(), frame.len());
         frame.data().iter().for_each(|byte| text.push_str(&format!("{byte:X} ")));

@@ -2,6 +2,7 @@
 
 use super::Global;
 use super::nodes::on_node;
+use super::scan::Scan;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::info::read;
@@ -13,19 +14,27 @@ use clap::Args;
 /// it shows signals with unit, range, status and settings, TPDOs and manufacturer-specific objects. Last, it shows the
 /// settings that 1010h stores. Missing objects are omitted.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  cangauge -b sim info 1\n  cangauge -b sim info 127 --format json")]
+#[command(
+    after_help = "Examples:\n  cangauge -b sim info 1\n  cangauge -b sim info 127 --format json\n  cangauge -b replay:run.log info 1 --passive"
+)]
 pub(crate) struct Info {
     /// Node-ID: 5, 0x7f
     node: NodeId,
+    /// Listen without sending anything; show state and identity, as far as other masters have read it
+    #[arg(long)]
+    pub(super) passive: bool,
 }
 
 impl Info {
     /// The node that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
-        Claim::Nodes(vec![self.node])
+        if self.passive { Claim::Nothing } else { Claim::Nodes(vec![self.node]) }
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        if self.passive {
+            return Scan::passive(self.node).run(global);
+        }
         global.print(&[on_node(global, self.node, |master, node| read(master, node))?])
     }
 }

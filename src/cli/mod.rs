@@ -278,6 +278,7 @@ impl Command {
     fn listens_only(&self) -> bool {
         match self {
             Command::Scan(scan) => scan.passive,
+            Command::Info(info) => info.passive,
             Command::Log(log) => log.passive,
             Command::Doctor(doctor) => doctor.passive,
             _ => false,

@@ -32,6 +32,11 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
+    /// Listens for one node.
+    pub(super) fn passive(node: NodeId) -> Scan {
+        Scan { nodes: Nodes::These(vec![node]), passive: true }
+    }
+
     /// The nodes that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         if self.passive { Claim::Nothing } else { self.nodes.claim() }

@@ -5,15 +5,21 @@ use super::exit::{FileError, IntoFailure};
 use super::{Global, open};
 use crate::bus::Bus;
 use crate::bus::claim::Claim;
+use crate::bus::interrupt::lines_with_interrupts;
 use crate::bus::memory::Station;
 use crate::bus::server::{Address, Server};
 use crate::output::failure::ErrorMessage;
 use crate::sim;
 use clap::Args;
+use std::path::PathBuf;
 
 /// Simulate devices on a bus until Ctrl-C
 ///
 /// The devices answer, send and fail as described in their manuals. Use them to test other programs.
+///
+/// Lines on standard input change values and cause faults: `pressure 1 5.2bar` holds a value, `silent 1` and `talk 1` stop
+/// and resume all traffic of a node, `emcy 1 F001` sends an emergency (0000 ends it), `unplug 1` and `plug 1` switch a
+/// device off and on.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b vcan0 sim mh4@5 dps@127\n  cangauge -b vcan0 sim bench.toml\n  \
                   cangauge sim mh4@5 --listen 29536      then: cangauge -b socketcand://localhost/can0 scan")]
@@ -26,6 +32,9 @@ pub(crate) struct Sim {
     /// address, only programs on this computer can connect
     #[arg(long, value_name = "[ADDR:]PORT")]
     listen: Option<Address>,
+    /// Keep what the devices store, and their node-IDs, in this file for the next run
+    #[arg(long, value_name = "FILE")]
+    state: Option<PathBuf>,
 }
 
 impl Sim {
@@ -35,7 +44,7 @@ impl Sim {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let bench = open::bench(&self.devices.join(","))?;
+        let bench = open::bench(&self.devices.join(","))?.with_state(self.state.clone());
         let mut bus = match self.listen {
             Some(address) => serve(global, address)?,
             None => open_bus(global)?,
@@ -43,7 +52,9 @@ impl Sim {
         let devices = bench.into_devices().map_err(open::bench_error)?;
         let stations = devices.into_iter().map(|device| Box::new(device) as Box<dyn Station>).collect();
         global.console().note("simulation is running; press Ctrl-C to end");
-        sim::host::run(&mut *bus, stations, None).or_fail()?;
+        let mut refuse = |why: &str| global.console().warn(why);
+        let console = sim::host::Console { lines: lines_with_interrupts(), refuse: &mut refuse };
+        sim::host::run(&mut *bus, stations, None, Some(console)).or_fail()?;
         Ok(bus.finish().or_fail()?)
     }
 }

@@ -8,6 +8,7 @@
 //! retime = false             # whether the program may change the bit rate; default: true
 //! seed = 7                   # seed of the noise; default: 0
 //! record = "truth.csv"       # record of the values sent, in the folder of this file
+//! state = "state.toml"       # keeps what the devices store, and their node-IDs, for the next run
 //!
 //! [[device]]
 //! kind = "mh4"               # a built-in description, or a description file in the folder of this file
@@ -33,6 +34,8 @@
 //! amplitude = 1.0
 //! period_s = 10.0
 //! noise = 0.0
+//! form = "ramp"              # from base - amplitude to base + amplitude in each period; default: "sine"
+//! csv = "course.csv"         # in place of them: lines of SECONDS,VALUE
 //!
 //! [[device.overload]]
 //! channel = 1
@@ -46,8 +49,10 @@ mod values;
 
 use super::device::Device;
 use super::record::Recorder;
+use super::state::StateFile;
 use crate::bus::memory::{BIT_RATE, Clock, MemoryBus};
 use crate::device::config_file::SyntaxError;
+pub(super) use file::value_in;
 use file::{BenchFile, DeviceEntry};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -64,6 +69,7 @@ pub struct Bench {
     bit_rate: u32,
     retime: bool,
     record: Option<PathBuf>,
+    state: Option<PathBuf>,
     devices: Vec<Device>,
 }
 
@@ -150,7 +156,13 @@ impl Bench {
             devices.push(Device::new(setup).map_err(|error| BenchError::Usage(format!("{}: {error}", entry.name())))?);
         }
         let record = file.record.map(|path| beside.join(path));
-        Ok(Bench { clock: file.clock.into(), bit_rate, retime: file.retime, record, devices })
+        let state = file.state.map(|path| beside.join(path));
+        Ok(Bench { clock: file.clock.into(), bit_rate, retime: file.retime, record, state, devices })
+    }
+
+    /// Keeps what the devices store in this file, if one is given here.
+    pub fn with_state(self, path: Option<PathBuf>) -> Bench {
+        Bench { state: path.or(self.state), ..self }
     }
 
     /// The clock of the bench.
@@ -158,11 +170,15 @@ impl Bench {
         self.clock
     }
 
-    /// The devices, with a recorder if the bench contains `record`.
+    /// The devices, with their memory of the last run and with a recorder if the bench contains `state` and `record`.
     ///
     /// # Errors
-    /// The record cannot be written.
-    pub fn into_devices(self) -> Result<Vec<Device>, BenchError> {
+    /// The record cannot be written; the file with the memory is not one, or another process uses it.
+    pub fn into_devices(mut self) -> Result<Vec<Device>, BenchError> {
+        if let Some(path) = &self.state {
+            let file = StateFile::open(path)?;
+            self.devices = self.devices.into_iter().map(|device| device.remembering(file.clone())).collect();
+        }
         let Some(path) = self.record else { return Ok(self.devices) };
         let recorder = std::fs::File::create(&path)
             .and_then(|file| Recorder::new(Box::new(file)))

@@ -106,6 +106,19 @@ impl Channels {
         Channels { list, shown }
     }
 
+    /// Holds a signal at a value: `pressure`, `5.2bar`.
+    pub(super) fn hold(&mut self, signal: &str, value: &str) -> Result<(), String> {
+        let names: Vec<&str> = self.list.iter().map(|channel| channel.signal.name.as_str()).collect();
+        let Some(place) = names.iter().position(|name| *name == signal) else {
+            return Err(format!("no signal \"{signal}\" (it has: {})", names.join(", ")));
+        };
+        let quantity = &mut self.list[place].quantity;
+        let value = super::bench::value_in(value, Unit(quantity.channel().unit))
+            .ok_or_else(|| format!("\"{value}\" is not a value with a unit of the signal"))?;
+        quantity.hold(value);
+        Ok(())
+    }
+
     /// The bytes of an object with a measurement at `time`; `None` for any other object.
     pub(super) fn read(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Vec<u8>> {
         let (index, shows) = *self.shown.get(&object)?;

@@ -66,6 +66,18 @@ pub enum SimState {
     Operational,
 }
 
+/// The form of the course of a simulated quantity.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Form {
+    /// A sine; with amplitude 0, a constant value.
+    #[default]
+    Sine,
+    /// From the lowest to the highest value in one period, again and again.
+    Ramp,
+    /// Lines between these points: seconds, value. The last value stays.
+    Points(std::sync::Arc<[(f64, f64)]>),
+}
+
 /// The course of a simulated quantity: a slow sine with noise.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -88,6 +100,16 @@ pub struct SimChannel {
     pub end: f64,
     /// The field value (x100h) at the start and at the end of the range; 0 and 10000 if `None` (CiA 404).
     pub field: Option<[f64; 2]>,
+    /// The form of the course.
+    #[serde(skip)]
+    pub form: Form,
+}
+
+impl SimChannel {
+    /// Holds the quantity at a value.
+    pub fn hold(&mut self, value: f64) {
+        (self.base, self.amplitude, self.noise, self.form) = (value, 0.0, 0.0, Form::Sine);
+    }
 }
 
 impl SimData {
@@ -122,6 +144,7 @@ impl SimData {
                 start,
                 end,
                 field: None,
+                form: Form::Sine,
             }
         });
         SimData { channels: channels.collect(), ..SimData::default() }

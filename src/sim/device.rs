@@ -1,6 +1,7 @@
 //! A simulated device: NMT, heartbeat, guarding, and the events that cause frames.
 
 mod assign;
+mod console;
 mod station;
 
 use super::channels::{Channels, status};
@@ -76,6 +77,9 @@ pub struct Device {
     /// Answers that are not due yet.
     delayed: VecDeque<(Mono, Frame)>,
     recorder: Option<Recorder>,
+    remembered: Option<console::Remembered>,
+    /// Whether it neither receives nor sends, as the user asked.
+    is_silent: bool,
     /// TPDOs that wait for the bus, with their lines for the record.
     in_transit: VecDeque<(Frame, Vec<Line>)>,
 }
@@ -123,6 +127,8 @@ impl Device {
             overloaded: BTreeMap::new(),
             delayed: VecDeque::new(),
             recorder: None,
+            remembered: None,
+            is_silent: false,
             in_transit: VecDeque::new(),
         })
     }

@@ -92,6 +92,13 @@ impl Emergencies {
         self.publish(objects);
     }
 
+    /// Ends all errors.
+    pub(super) fn end(&mut self, objects: &mut Objects) {
+        self.pending.clear();
+        self.publish(objects);
+        self.queue(objects, 0x0000, [0; 5]);
+    }
+
     /// Resets everything, as at power-on.
     pub(super) fn forget(&mut self) {
         self.pending.clear();

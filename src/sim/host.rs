@@ -4,7 +4,9 @@ use crate::bus::memory::{Outbox, Station, Tuning};
 use crate::bus::time::Mono;
 use crate::bus::{Bus, BusError, Event};
 use crate::canopen::frame::Frame;
+use crate::canopen::id::NodeId;
 use crate::canopen::wire_length::priority;
+use crate::sim::Device;
 use std::time::Duration;
 
 /// The wait if the bus accepts no more frames.
@@ -24,6 +26,7 @@ pub fn run(
     bus: &mut dyn Bus,
     stations: Vec<Box<dyn Station>>,
     until: Option<Mono>,
+    mut console: Option<Console<'_>>,
 ) -> Result<Vec<Box<dyn Station>>, BusError> {
     let places = stations.into_iter().map(|station| (station, Outbox::default())).collect();
     let mut host = Host { places, bit_rate: bus.bit_rate() };
@@ -41,6 +44,7 @@ pub fn run(
         let deadline = until.map_or(next, |until| until.min(next));
         match bus.receive(deadline)? {
             Event::Frame(received) => host.hear(None, received.at.mono, &received.frame),
+            Event::Interrupted if console.as_mut().is_some_and(|console| host.obey(console, bus.mono())) => {}
             Event::Interrupted | Event::Ended => break,
             Event::Timeout if until.is_some_and(|until| bus.now().mono >= until) => break,
             Event::Link(true) => host.retime(bus.bit_rate()),
@@ -48,6 +52,14 @@ pub fn run(
         }
     }
     Ok(host.places.into_iter().map(|(station, _)| station).collect())
+}
+
+/// The commands of a user while the simulation runs. Each line comes with an interrupt, which ends a wait.
+pub struct Console<'a> {
+    /// The lines.
+    pub lines: std::sync::mpsc::Receiver<String>,
+    /// Receives the reason why a line was not executed.
+    pub refuse: &'a mut dyn FnMut(&str),
 }
 
 struct Host {
@@ -59,6 +71,37 @@ struct Host {
 impl Host {
     fn next_wake(&self) -> Option<Mono> {
         self.places.iter().filter_map(|(station, _)| station.next_wake()).min()
+    }
+
+    /// Executes the line that came with an interrupt; `false` if there is none: the user asks to stop.
+    fn obey(&mut self, console: &mut Console<'_>, now: Mono) -> bool {
+        let Ok(line) = console.lines.try_recv() else { return false };
+        if let Err(why) = self.execute(&line, now) {
+            (console.refuse)(&format!("\"{}\": {why}", line.escape_debug()));
+        }
+        true
+    }
+
+    /// Executes `pressure 1 5.2bar`, `silent 1`, `emcy 1 F001`, `unplug 1`: the second word is the node-ID.
+    fn execute(&mut self, line: &str, now: Mono) -> Result<(), String> {
+        const USAGE: &str = "commands: pressure 1 5.2bar, silent 1, talk 1, emcy 1 F001, unplug 1, plug 1";
+        let mut words: Vec<&str> = line.split_whitespace().collect();
+        if words.is_empty() {
+            return Ok(());
+        }
+        if words.len() < 2 {
+            return Err(USAGE.to_owned());
+        }
+        let node: NodeId = words.remove(1).parse().map_err(|_| USAGE.to_owned())?;
+        let devices = self.places.iter_mut().filter_map(|(station, out)| {
+            let station: &mut dyn std::any::Any = &mut **station;
+            Some((station.downcast_mut::<Device>()?, out))
+        });
+        let mut found = devices.filter(|(device, _)| device.node() == Some(node)).peekable();
+        if found.peek().is_none() {
+            return Err(format!("no simulated device has node-ID {node}"));
+        }
+        found.try_for_each(|(device, out)| device.command(&words, now, out))
     }
 
     fn wake(&mut self, now: Mono) {
@@ -128,7 +171,7 @@ impl Host {
 mod tests {
     use super::*;
     use crate::bus::memory::{Clock, MemoryBus};
-    use crate::sim::{Device, Setup};
+    use crate::sim::Setup;
     use std::collections::VecDeque;
 
     /// The peer on the bus: sends at given times and keeps the frames received.
@@ -184,7 +227,8 @@ mod tests {
     fn devices_answer_a_master_on_the_bus() {
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.attach(master(&[(10, "605#4000100000000000"), (20, "000#0100"), (30, "080#")]));
-        let stations = run(&mut bus, vec![device("mh4", 5), device("dps", 127)], Some(ms(150))).expect("no error");
+        let stations =
+            run(&mut bus, vec![device("mh4", 5), device("dps", 127)], Some(ms(150)), None).expect("no error");
         assert_eq!(
             received(&bus),
             ["705#00", "77F#00", "585#4300100094018200", "185#0000803F00", "1FF#E8030000"].map(str::to_owned)
@@ -197,7 +241,7 @@ mod tests {
     fn stations_receive_the_frames_of_other_stations_only() {
         let mut bus = MemoryBus::new(Clock::Virtual);
         let hosted: Vec<Box<dyn Station>> = vec![Box::new(master(&[(10, "000#0105"), (20, "080#")])), device("mh4", 5)];
-        let stations = run(&mut bus, hosted, Some(ms(50))).expect("no error");
+        let stations = run(&mut bus, hosted, Some(ms(50)), None).expect("no error");
         let station: &dyn std::any::Any = &*stations[0];
         let master: &Master = station.downcast_ref().expect("the master");
         assert_eq!(master.received, ["705#00", "185#0000803F00"]);
@@ -207,7 +251,7 @@ mod tests {
     fn full_queue_loses_no_frame() {
         let mut bus = MemoryBus::new(Clock::Virtual).with_queue_length(1);
         bus.attach(master(&[(10, "000#0103")]));
-        run(&mut bus, vec![device("mc1609", 3)], Some(ms(120))).expect("no error");
+        run(&mut bus, vec![device("mc1609", 3)], Some(ms(120)), None).expect("no error");
         assert_eq!(
             received(&bus),
             ["703#00", "183#0A0014001E002800", "283#32003C0046005000", "383#5A0064006E007800", "483#82008C009600A000"]
@@ -224,7 +268,7 @@ mod tests {
         plan.push((40, "605#4000100000000000"));
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.attach(master(&plan));
-        run(&mut bus, vec![device("mh4", 5)], Some(ms(500))).expect("no error");
+        run(&mut bus, vec![device("mh4", 5)], Some(ms(500)), None).expect("no error");
         assert_eq!(received(&bus), ["705#00", "585#6017100000000000", "705#7F", "7E4#1300000000000000"]);
     }
 
@@ -232,7 +276,60 @@ mod tests {
     fn interrupt_ends_the_run() {
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.interrupt_at(ms(70));
-        run(&mut bus, vec![device("mh4", 5)], None).expect("no error");
+        run(&mut bus, vec![device("mh4", 5)], None, None).expect("no error");
         assert_eq!(bus.now().mono, ms(70));
+    }
+
+    #[test]
+    fn lines_change_values_and_cause_faults() {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(master(&[
+            (5, "000#0105"),
+            (40, "080#"),
+            (120, "605#4000100000000000"),
+            (200, "605#4000100000000000"),
+        ]));
+        let (sender, lines) = std::sync::mpsc::channel();
+        let plan = [
+            (10, "pressure 5 1.5bar"),
+            (15, "pressure 5 2"),
+            (20, "volume 5 1l"),
+            (21, "pressure 6 1bar"),
+            (22, "dance"),
+            (60, "emcy 5 f001"),
+            (70, "emcy 5 0"),
+            (100, "silent 5"),
+            (150, "talk 5"),
+            (220, "unplug 5"),
+            (230, "plug 5"),
+            (231, "plug 5"),
+        ];
+        for (at, line) in plan {
+            sender.send(line.to_owned()).expect("sent");
+            bus.interrupt_at(ms(at));
+        }
+        let mut refused = Vec::new();
+        let console = Console { lines, refuse: &mut |why: &str| refused.push(why.to_owned()) };
+        run(&mut bus, vec![device("mh4", 5)], Some(ms(300)), Some(console)).expect("no error");
+        assert_eq!(
+            received(&bus),
+            [
+                "705#00",
+                "185#0000004000",
+                "085#01F0810000000000",
+                "085#0000000000000000",
+                "585#4300100094018200",
+                "705#00"
+            ]
+        );
+        assert_eq!(
+            refused,
+            [
+                "\"volume 5 1l\": no signal \"volume\" (it has: pressure, temperature)",
+                "\"pressure 6 1bar\": no simulated device has node-ID 6",
+                "\"dance\": commands: pressure 1 5.2bar, silent 1, talk 1, emcy 1 F001, unplug 1, plug 1",
+                "\"plug 5\": the device is not unplugged",
+            ]
+        );
     }
 }

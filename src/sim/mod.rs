@@ -27,11 +27,12 @@ mod sdo_block;
 mod sdo_server;
 mod settings;
 mod setup;
+mod state;
 mod tpdo;
 
 pub use abort::Abort;
 pub use bench::{Bench, BenchError};
-pub use data::{SimChannel, SimData, SimLss, SimState};
+pub use data::{Form, SimChannel, SimData, SimLss, SimState};
 pub use device::Device;
 pub use model::{Direction, Overload};
 pub use nmt::State;

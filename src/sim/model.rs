@@ -1,6 +1,6 @@
 //! The quantity that a simulated channel measures: a pure function of seed and time.
 
-use crate::sim::data::SimChannel;
+use crate::sim::data::{Form, SimChannel};
 use std::time::Duration;
 
 /// The side of the measuring range on which the quantity is outside.
@@ -49,6 +49,12 @@ impl Quantity {
         Quantity { channel, sample: sample.max(Duration::from_nanos(1)), margin, overloads, key }
     }
 
+    /// Holds the quantity at a value from now on.
+    pub(super) fn hold(&mut self, value: f64) {
+        self.channel.hold(value);
+        self.overloads.clear();
+    }
+
     /// The sample time in microseconds, at least 1.
     pub(super) fn sample_us(&self) -> u128 {
         self.sample.as_micros().max(1)
@@ -88,9 +94,14 @@ impl Quantity {
             Some(Direction::High) => channel.end + far,
             Some(Direction::Low) => channel.start - far,
             None => {
-                let turns = if channel.period_s > 0.0 { sampled.as_secs_f64() / channel.period_s } else { 0.0 };
-                let swing = channel.amplitude * (turns * std::f64::consts::TAU).sin();
-                channel.base + swing + channel.noise * self.noise(index)
+                let seconds = sampled.as_secs_f64();
+                let turns = if channel.period_s > 0.0 { seconds / channel.period_s } else { 0.0 };
+                let value = match &channel.form {
+                    Form::Sine => channel.base + channel.amplitude * (turns * std::f64::consts::TAU).sin(),
+                    Form::Ramp => channel.base + channel.amplitude * (2.0 * turns.fract() - 1.0),
+                    Form::Points(points) => between(points, seconds),
+                };
+                value + channel.noise * self.noise(index)
             }
         }
     }
@@ -142,8 +153,18 @@ impl Quantity {
     /// The lowest and highest possible value without scripted overloads.
     fn swing(&self) -> (f64, f64) {
         let channel = &self.channel;
-        let reach = channel.amplitude.abs() + channel.noise.abs();
-        (channel.base - reach, channel.base + reach)
+        let (low, high) = match &channel.form {
+            Form::Points(points) => {
+                points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, value)| {
+                    (low.min(*value), high.max(*value))
+                })
+            }
+            Form::Sine | Form::Ramp => {
+                let reach = channel.amplitude.abs();
+                (channel.base - reach, channel.base + reach)
+            }
+        };
+        (low - channel.noise.abs(), high + channel.noise.abs())
     }
 
     /// The lowest and highest possible value.
@@ -153,6 +174,16 @@ impl Quantity {
             Direction::High => (low, high.max(self.channel.end + far)),
             Direction::Low => (low.min(self.channel.start - far), high),
         })
+    }
+}
+
+/// The value at a time: on the line between two points, that of the first before them, that of the last after them.
+fn between(points: &[(f64, f64)], seconds: f64) -> f64 {
+    let next = points.partition_point(|(at, _)| *at <= seconds);
+    match (next.checked_sub(1).and_then(|last| points.get(last)), points.get(next)) {
+        (Some((from, low)), Some((until, high))) => low + (high - low) * (seconds - from) / (until - from),
+        (Some((_, value)), None) | (None, Some((_, value))) => *value,
+        (None, None) => 0.0,
     }
 }
 

@@ -269,6 +269,17 @@ impl Objects {
         }
     }
 
+    /// The stored values.
+    pub(super) fn saved(&self) -> &BTreeMap<ObjectId, Vec<u8>> {
+        &self.saved
+    }
+
+    /// Sets the stored values; they become active at the next reset.
+    pub(super) fn set_saved(&mut self, saved: BTreeMap<ObjectId, Vec<u8>>) {
+        self.saved = saved;
+        self.saved.retain(|object, _| self.specs.contains_key(object));
+    }
+
     /// Deletes the stored values of a group; the working values change at the next reset.
     pub(super) fn restore(&mut self, group: Group) {
         let specs = Arc::clone(&self.specs);

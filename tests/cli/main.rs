@@ -33,6 +33,7 @@ mod replay;
 mod scan;
 mod sdo;
 mod settings;
+mod sim;
 mod store;
 mod write_form;
 

@@ -336,6 +336,9 @@ fn scan_reads_identities_from_the_sdo_traffic() {
     let done = replay(&bench, "t.log", "scan --passive --format json").exit(0);
     let node = &done.json()[0];
     assert_eq!((&node["device"], &node["vendor"], &node["name"]), (&"mh4".into(), &71.into(), &"MH-4-CAN".into()));
+    let shown = replay(&bench, "t.log", "info 1 --passive --format json").exit(0);
+    assert_eq!(shown.json(), done.json());
+    replay(&bench, "t.log", "info 2 --passive").exit(3);
     // Refused and unanswered objects are unknown.
     let text = "(1700000000.0) can0 605#4018100100000000\n(1700000000.1) can0 585#8018100100000206\n\
                 (1700000000.2) can0 605#4000100000000000\n(1700000000.3) can0 585#4300100094010200\n";

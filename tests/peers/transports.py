@@ -279,6 +279,7 @@ def main(program, interface=None):
             simulator.await_words("simulation is running")
             compare(f"SocketCAN, {interface}", results(program, interface), expected)
             times[interface] = round_trip(program, interface)
+        kernel_adapter(program, directory, expected)
     print("one SDO read: " + ", ".join(f"{name} {time:.2f} ms" for name, time in times.items()))
 
 
@@ -327,6 +328,27 @@ def foreign_adapter(program, directory, expected, times):
             with Wire(foreign, behind), Cable(master, other_master):
                 found = results(program, f"slcan:{os.ttyname(other)}@250k", FEW)
                 compare("slcan, python-can's slcan", found, few(expected))
+
+
+def kernel_adapter(program, directory, expected):
+    """The kernel's slcan driver, with simulated devices on its interface."""
+    ends = [pty.openpty() for _ in range(2)]
+    for _, slave in ends:
+        tty.setraw(slave)
+    (master, path), (other_master, other) = ends
+    command = ["slcand", "-F", "-o", "-s5", os.ttyname(path), "slcan9"]
+    with Cable(master, other_master):
+        driver = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        try:
+            up = ["ip", "link", "set", "slcan9", "up"]
+            wait_for(lambda: subprocess.run(up, stderr=subprocess.DEVNULL).returncode == 0, lambda: "no slcan9", driver)
+            with Cangauge(program, "slcan9").running("sim", *DEVICES, directory=directory) as simulator:
+                simulator.await_words("simulation is running")
+                found = results(program, f"slcan:{os.ttyname(other)}@250k", FEW)
+                compare("slcan, the kernel's driver", found, few(expected))
+        finally:
+            driver.terminate()
+            driver.wait()
 
 
 class Cable(Thread):

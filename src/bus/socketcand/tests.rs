@@ -210,7 +210,7 @@ fn a_server_that_does_not_read_fills_the_queue() {
     thread.join().expect("the server");
     assert!(matches!(
         open_client().send(&remote, Stamp::default(), &mut Output::default()),
-        Err(BusError::Unsupported(_))
+        Err(BusError::NoRemoteFrames)
     ));
 }
 

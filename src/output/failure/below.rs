@@ -46,6 +46,7 @@ pub(super) fn bus(error: &BusError) -> Words {
             Some(hint) => words.hint(hint),
             None => words,
         },
+        BusError::NoRemoteFrames => words.hint("use SDO instead: --poll 100ms"),
         BusError::Unsupported(_) => words.hint("use simulated devices: --bus sim"),
         _ => words,
     }

@@ -8,7 +8,7 @@ use crate::device::catalog::{self, Model};
 use crate::device::eds;
 use crate::device::scalar::Scalar;
 use crate::device::unit::Unit;
-use crate::sim::data::SimChannel;
+use crate::sim::data::{Form, SimChannel};
 use crate::sim::model::{Direction, Overload};
 use crate::sim::setup::{Oddities, OfflineAfter, Setup};
 use serde::{Deserialize, Deserializer};
@@ -32,6 +32,7 @@ pub(super) struct BenchFile {
     #[serde(default)]
     pub(super) seed: u64,
     pub(super) record: Option<PathBuf>,
+    pub(super) state: Option<PathBuf>,
     #[serde(default)]
     pub(super) device: Vec<DeviceEntry>,
 }
@@ -138,6 +139,15 @@ struct ChannelEntry {
     noise: Option<f64>,
     start: Option<f64>,
     end: Option<f64>,
+    form: Option<FormName>,
+    csv: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum FormName {
+    Sine,
+    Ramp,
 }
 
 #[derive(Deserialize)]
@@ -199,7 +209,7 @@ impl DeviceEntry {
         setup.set = self.set.iter().map(|(object, value)| (*object, value.clone())).collect();
         setup.seed = seed;
         for changed in &self.channel {
-            changed.apply(self.find(&mut setup.channels, changed.channel)?);
+            changed.apply(self.find(&mut setup.channels, changed.channel)?, beside)?;
         }
         for text in &self.constant {
             self.hold(&mut setup, text).ok_or_else(|| {
@@ -226,14 +236,9 @@ impl DeviceEntry {
     /// Sets a signal to a constant value: `pressure=0bar`. Without a unit, the unit of the simulator is used.
     fn hold(&self, setup: &mut Setup, text: &str) -> Option<()> {
         let (name, value) = text.split_once('=')?;
-        let (number, unit) =
-            value.split_at(value.find(|letter: char| !"+-.0123456789".contains(letter)).unwrap_or(value.len()));
         let signal = setup.model.description.signals.iter().find(|signal| signal.name == name)?;
         let channel = setup.channels.iter_mut().find(|channel| channel.channel == signal.channel)?;
-        let own = Unit(channel.unit);
-        let unit = if unit.is_empty() { own } else { Unit::from_symbol(unit.trim())? };
-        channel.base = unit.convert(number.parse().ok()?, own)?;
-        (channel.amplitude, channel.noise) = (0.0, 0.0);
+        channel.hold(value_in(value, Unit(channel.unit))?);
         Some(())
     }
 
@@ -263,8 +268,46 @@ impl DeviceEntry {
     }
 }
 
+/// A value in the unit `own`: `5.2bar`, or a number in that unit.
+pub(in crate::sim) fn value_in(text: &str, own: Unit) -> Option<f64> {
+    let (number, unit) =
+        text.split_at(text.find(|letter: char| !"+-.0123456789".contains(letter)).unwrap_or(text.len()));
+    let unit = if unit.is_empty() { own } else { Unit::from_symbol(unit.trim())? };
+    unit.convert(number.parse().ok()?, own)
+}
+
+/// The points of a CSV file: seconds, value. A first line that is no number is a heading.
+fn points(path: &Path) -> Result<Form, BenchError> {
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for (index, line) in read(path)?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let pair = line
+            .split_once([',', ';'])
+            .and_then(|(at, value)| Some((at.trim().parse().ok()?, value.trim().parse().ok()?)));
+        match pair {
+            Some((at, value)) if points.last().is_none_or(|(before, _)| *before < at) && f64::is_finite(value) => {
+                points.push((at, value));
+            }
+            None if index == 0 => {}
+            _ => {
+                let line = index + 1;
+                let message = "not SECONDS,VALUE with a later time than the line before";
+                return Err(BenchError::Usage(format!("{}:{line}: {message}", path.display())));
+            }
+        }
+    }
+    match points.is_empty() {
+        true => Err(BenchError::Usage(format!("{}: no values", path.display()))),
+        false => Ok(Form::Points(points.into())),
+    }
+}
+
 impl ChannelEntry {
-    fn apply(&self, channel: &mut SimChannel) {
+    fn apply(&self, channel: &mut SimChannel, beside: &Path) -> Result<(), BenchError> {
+        channel.form = match (&self.csv, self.form) {
+            (Some(path), _) => points(&beside.join(path))?,
+            (None, Some(FormName::Ramp)) => Form::Ramp,
+            (None, Some(FormName::Sine) | None) => Form::Sine,
+        };
         let SimChannel { base, amplitude, period_s, noise, start, end, .. } = channel;
         for (given, value) in [
             (self.base, base),
@@ -276,5 +319,6 @@ impl ChannelEntry {
         ] {
             *value = given.unwrap_or(*value);
         }
+        Ok(())
     }
 }

@@ -263,3 +263,38 @@ fn eds_alone_is_a_device() {
     assert_eq!(answer("609#4018100100000000"), "589#4318100134120000");
     assert!(refusal(Bench::parse("missing.eds@5")).starts_with("missing.eds: "));
 }
+
+#[test]
+fn quantities_follow_a_ramp_or_a_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("course.csv"), "seconds,bar\n0,1\n0.01; 3\n\n0.02,2\n").expect("written");
+    std::fs::write(folder.path().join("wrong.csv"), "0,1\n1,2\n1,3\n").expect("written");
+    let channel = "[[device.channel]]\nchannel = 1\nnoise = 0.0\n";
+    let bench = |keys: &str| {
+        let text = format!("clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\nstart = true\n{channel}{keys}");
+        Bench::from_toml(&text, folder.path())
+    };
+    let values = |keys: &str| {
+        let mut bus = bench(keys).expect("a bench").open().expect("a bus");
+        [1, 5, 10, 15, 505].map(|at| {
+            let now = Mono::at(Duration::from_millis(at));
+            let value =
+                bus.stations_mut::<Device>().next().and_then(|device| device.value(ObjectId::new(0x6130, 1), now));
+            f32::from_le_bytes(value.and_then(|bytes| bytes.try_into().ok()).expect("a value"))
+        })
+    };
+    for (found, expected) in [
+        (values("csv = \"course.csv\"\n"), [1.2, 2.0, 3.0, 2.5, 2.0]),
+        (values("form = \"ramp\"\nbase = 5.0\namplitude = 2.0\nperiod_s = 0.02\n"), [3.2, 4.0, 5.0, 6.0, 4.0]),
+        (values("base = 5.0\namplitude = 0.0\n"), [5.0; 5]),
+    ] {
+        assert!(found.iter().zip(expected).all(|(one, other)| (one - other).abs() < 0.25), "{found:?} {expected:?}");
+    }
+    let error = |keys: &str| bench(keys).err().expect("an error").to_string();
+    assert!(
+        error("csv = \"wrong.csv\"\n")
+            .ends_with("wrong.csv:3: not SECONDS,VALUE with a later time than the line before")
+    );
+    assert!(error("csv = \"absent.csv\"\n").contains("absent.csv"));
+    assert!(error("form = \"square\"\n").contains("unknown variant"));
+}

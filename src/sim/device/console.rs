@@ -1,0 +1,74 @@
+//! The memory of a device that lasts between runs, and what a user changes while the simulation runs.
+
+use super::*;
+use crate::sim::state::{StateFile, Stored};
+
+/// Where a device keeps what it has stored.
+pub(super) struct Remembered {
+    file: StateFile,
+    last: Stored,
+}
+
+impl Device {
+    /// The same device with what it has stored in this file, where it stores from now on.
+    pub(in crate::sim) fn remembering(mut self, file: StateFile) -> Device {
+        let Memory { settings, objects, .. } = &mut self.memory;
+        if let Some(stored) = file.get(&self.setup.model.description.name, self.setup.serial) {
+            for pair in [&mut settings.active, &mut settings.pending, &mut settings.persistent] {
+                pair.node = stored.node;
+                pair.rate = stored.bit_rate.map_or(pair.rate, BitRate::At);
+            }
+            self.setup.bit_rate = stored.bit_rate.or(self.setup.bit_rate);
+            objects.set_saved(stored.objects);
+        }
+        let last = Stored::of(settings, objects);
+        self.remembered = Some(Remembered { file, last });
+        self
+    }
+
+    /// Writes what was stored since the last call.
+    pub(super) fn remember(&mut self) {
+        let Some(remembered) = &mut self.remembered else { return };
+        let now = Stored::of(&self.memory.settings, &self.memory.objects);
+        if now != remembered.last {
+            let kind = &self.setup.model.description.name;
+            // A full disk: the device keeps its memory in this run, and tries again with the next change.
+            if remembered.file.set(kind, self.setup.serial, &now).is_ok() {
+                remembered.last = now;
+            }
+        }
+    }
+
+    /// Executes a command of the user, without its node-ID: `pressure 5.2bar`, `silent`, `talk`, `emcy F001`, `unplug`,
+    /// `plug`.
+    pub(in crate::sim) fn command(&mut self, words: &[&str], now: Mono, out: &mut Outbox) -> Result<(), String> {
+        match *words {
+            ["silent"] => self.is_silent = true,
+            ["talk"] => self.is_silent = false,
+            ["unplug"] => {
+                self.drop_pending(out);
+                self.phase = Phase::Off;
+            }
+            ["plug"] if self.phase == Phase::Off => crate::bus::memory::Station::power_on(self, now, out),
+            ["plug"] => return Err("the device is not unplugged".to_owned()),
+            ["emcy", code] => {
+                let code = u16::from_str_radix(code.trim_start_matches("0x"), 16)
+                    .map_err(|_| format!("\"{code}\" is not an emergency code (F001; 0000 ends it)"))?;
+                match code {
+                    0 => self.memory.emergencies.end(&mut self.memory.objects),
+                    code => self.memory.emergencies.raise(&mut self.memory.objects, code, 0, 0),
+                }
+                self.send_emergencies(now, out);
+            }
+            [signal, value] => {
+                self.memory.channels.hold(signal, value)?;
+                if self.phase != Phase::Off {
+                    self.update_overloads(now);
+                    self.send_emergencies(now, out);
+                }
+            }
+            _ => return Err("unknown command".to_owned()),
+        }
+        Ok(())
+    }
+}
