@@ -294,7 +294,7 @@ fn settings_reported_as_stored_survive_a_reset() {
                     assert!(bus.look("0x6132:1") == [1] || restarts, "{place}");
                 }
                 Err(failure) => {
-                    let texts = ["it is unknown whether the settings were stored", "it is not verified"];
+                    let texts = ["it is unknown whether the settings were stored", "the result was not verified"];
                     let is_reported = texts.iter().any(|text| ErrorMessage::of(&failure).message.contains(text));
                     assert_eq!(is_reported, bus.count("73617665") == 1, "{place}");
                 }
@@ -347,7 +347,7 @@ fn values_reported_as_restored_are_factory_defaults() {
                 assert_eq!(bus.look("0x1017"), [0, 0], "{place}");
             }
             Err(failure) => {
-                let texts = ["whether the next reset sets the defaults", "it is not verified"];
+                let texts = ["whether the next reset sets the defaults", "the result was not verified"];
                 let is_reported = texts.iter().any(|text| ErrorMessage::of(&failure).message.contains(text));
                 assert_eq!(is_reported, bus.count("6C6F6164") == 1, "{place}");
             }
