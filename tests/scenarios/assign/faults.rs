@@ -107,7 +107,7 @@ fn silent_lss_uses_the_objects_of_the_description() {
     let done = run(&mut bus, "5", &Wanted { via: Via::Lss, ..id(12) });
     assert_eq!(done.failure().0, Kind::NoAnswer);
     let hint = ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap();
-    assert!(hint.contains("cangauge nmt stop 5; cangauge lss inquire 0x47:0x1:0x1:100"), "{hint}");
+    assert!(hint.contains("cangauge nmt stop 5 && cangauge lss inquire 0x47:0x1:0x1:100"), "{hint}");
 }
 
 #[test]
