@@ -78,7 +78,7 @@ fn every_file_is_tested_and_names_its_origin() {
             }
         }
     }
-    assert_eq!(files, 30);
+    assert_eq!(files, 32);
 }
 
 #[test]
@@ -192,6 +192,8 @@ fn encodings() {
     assert_eq!((eds.info.eds_version.as_str(), eds.info.vendor_name.as_deref()), ("4.0", Some("Müller Meßgeräte")));
     assert_eq!(entry(&eds, "überdruck").object, ObjectId::new(0x2000, 0));
 
+    let eds = load("32-utf16-without-mark.eds", &[]);
+    assert_eq!(eds.info.vendor_name.as_deref(), Some("Müller"));
     let eds = load("07-utf16.eds", &[]);
     assert_eq!(eds.info.vendor_name.as_deref(), Some("Müller"));
     assert_eq!(default(&eds, "vendor-id"), integer(0xabc));
@@ -540,7 +542,7 @@ fn names_are_unique_and_can_be_typed() {
             "reserved-2000-2000",
             "reserved-2001",
             "reserved-2000",
-            "add-2003",
+            "add",
             "object-2004",
             "object-2005",
             "größe-µm",
@@ -586,4 +588,82 @@ fn sixteen_channels_over_four_tpdos() {
     assert_eq!(number(&eds.dictionary, 0x6132, 16, 10), Some(1));
     assert_eq!(entry(&eds, "vendor-id").full_name(), "identity-object:1");
     assert_eq!(entry(&eds, "tpdo-4-mapping-parameter:1").object, ObjectId::new(0x1a03, 1));
+}
+
+#[test]
+fn spelling_of_the_file_is_a_name() {
+    let eds = load(
+        "31-spellings.eds",
+        &[
+            "line 299: [2006] DataType: \"0003h\" is read as 0x0003",
+            "line 307: [2007] DataType: \"1B\" is read as 0x001B",
+        ],
+    );
+    let object = |name: &str| eds.dictionary.find(name).map(|entry| entry.object.to_string());
+    for (name, expected) in [
+        ("Pressure / Temperature", Some("0x2000:0")),
+        ("value  <  3", Some("0x2001:0")),
+        ("Value # 3", Some("0x2002:0")),
+        ("+offset", Some("0x2003:0")),
+        ("Offset", Some("0x2004:0")),
+        ("***", Some("0x2008:0")),
+        ("sensor-a:1", Some("0x200A:1")),
+        ("Sensor B", Some("0x200B:1")),
+        ("Level:2", Some("0x200A:2")),
+        ("Value", None),
+    ] {
+        assert_eq!(object(name).as_deref(), expected, "{name}");
+    }
+    assert_eq!(eds.dictionary.namesakes("value"), ["sensor-a:1", "sensor-b:1"]);
+    assert_eq!(eds.dictionary.namesakes("Sensor A"), ["sensor-a:1", "level-2"]);
+    assert!(eds.dictionary.namesakes("Face").is_empty());
+    let types =
+        [0x2005, 0x2006, 0x2007].map(|index| eds.dictionary.get(ObjectId::new(index, 0)).map(|it| it.data_type));
+    assert_eq!(types, [DataType::Integer(2), DataType::Integer(2), DataType::Unsigned(8)].map(Some));
+}
+
+/// The names in a file with their objects, read by other means than those of the program.
+fn names_in(text: &str) -> Vec<(ObjectId, String)> {
+    let mut object = None;
+    let mut names = Vec::new();
+    for line in text.lines().map(str::trim) {
+        if let Some(section) = line.strip_prefix('[').and_then(|rest| rest.split(']').next()) {
+            let section = section.to_lowercase().replace([' ', '\t'], "").replace("0x", "");
+            let (index, sub) = section.split_once("sub").unwrap_or((&section, "0"));
+            let index = u16::from_str_radix(index, 16).ok().filter(|_| index.len() == 4);
+            object = index.and_then(|index| Some(ObjectId::new(index, u8::from_str_radix(sub, 16).ok()?)));
+        } else if let Some((key, name)) = line.split_once('=')
+            && key.to_lowercase().replace([' ', '\t'], "") == "parametername"
+        {
+            names.extend(object.take().map(|object| (object, name.trim().to_owned())));
+        }
+    }
+    names
+}
+
+#[test]
+fn every_name_in_every_file_can_be_typed() {
+    let mut count = 0;
+    for file in std::fs::read_dir(data()).expect("a folder") {
+        let path = file.expect("a file").path();
+        let bytes = std::fs::read(&path).unwrap_or_default();
+        let (Ok(eds), Ok(text)) = (eds::read(&bytes), String::from_utf8(bytes)) else { continue };
+        let named = |(object, name): &(ObjectId, String)| {
+            let is_known = eds.dictionary.get(*object).is_some();
+            is_known
+                && !path.ends_with("26-duplicates.eds")
+                && !name.is_empty()
+                && !ObjectId::reads_as_address(name)
+                && name.chars().count() <= 241
+        };
+        for (object, name) in names_in(text.trim_start_matches('\u{feff}')).into_iter().filter(named) {
+            // A name that objects share gives their full names. The name of a record or array means its sub-objects.
+            let mut named = [vec![name.clone()], eds.dictionary.namesakes(&name)].concat().into_iter();
+            let is_found =
+                named.any(|name| eds.dictionary.find(&name).is_some_and(|it| it.object.index == object.index));
+            assert!(is_found, "{}: {object} {name}", path.display());
+            count += 1;
+        }
+    }
+    assert!(count > 500, "{count}");
 }

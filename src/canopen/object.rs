@@ -38,6 +38,15 @@ impl ObjectId {
         ObjectId { index: u16::from_le_bytes([bytes[0], bytes[1]]), sub: bytes[2] }
     }
 
+    /// Whether a text is an address, or looks like one although it is wrong: `12345`, `6130:300`. It is no name then.
+    pub fn reads_as_address(text: &str) -> bool {
+        let is_part = |character: char| character.is_ascii_hexdigit() || "xXhH:.".contains(character);
+        let index = text.split([':', '.']).next().unwrap_or(text);
+        let is_long = index.len() >= 4 || index.starts_with("0x") || index.starts_with("0X");
+        let starts = text.starts_with(|first: char| first.is_ascii_digit());
+        text.parse::<ObjectId>().is_ok() || starts && is_long && text.chars().all(is_part)
+    }
+
     /// The object at the same index and another sub-index.
     pub fn with_sub(self, sub: u8) -> ObjectId {
         ObjectId { sub, ..self }
@@ -67,9 +76,15 @@ impl FromStr for ObjectId {
                     None => parse_u32(sub)?,
                 },
             };
-            let index = index.strip_prefix("0x").or_else(|| index.strip_prefix("0X")).unwrap_or(index);
-            let index = index.strip_suffix(['h', 'H']).unwrap_or(index);
-            let index = parse_u32(&format!("0x{index}"))?;
+            let hex = index.strip_prefix("0x").or_else(|| index.strip_prefix("0X"));
+            let digits = hex.unwrap_or(index);
+            let digits = digits.strip_suffix(['h', 'H']).unwrap_or(digits);
+            // Without 0x, short numbers and words are names: `100`, `7F`, `Face`.
+            let is_word = digits == index && !digits.contains(|digit: char| digit.is_ascii_digit());
+            if hex.is_none() && (digits.len() != 4 || is_word) {
+                return None;
+            }
+            let index = parse_u32(&format!("0x{digits}"))?;
             Some(ObjectId { index: u16::try_from(index).ok()?, sub: u8::try_from(sub).ok()? })
         };
         parse().ok_or_else(|| ObjectIdError(text.to_owned()))

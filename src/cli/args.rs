@@ -113,7 +113,7 @@ impl FromStr for SignalArg {
             }
             match object.parse::<ObjectId>() {
                 Ok(object) => return Ok(SignalArg(Wanted::Object(object, stated))),
-                Err(error) if stated.is_some() || is_like_address(text) => return Err(error.to_string()),
+                Err(error) if stated.is_some() || ObjectId::reads_as_address(text) => return Err(error.to_string()),
                 Err(_) => {}
             }
         }
@@ -127,12 +127,6 @@ impl FromStr for SignalArg {
 fn is_name(text: &str) -> bool {
     text.starts_with(|first: char| first.is_ascii_alphabetic())
         && text.chars().all(|character| character.is_ascii_alphanumeric() || character == '-' || character == '_')
-}
-
-/// Whether a text looks like an address but is not valid: `12345`, `6130:300`.
-fn is_like_address(text: &str) -> bool {
-    let is_part = |character: char| character.is_ascii_hexdigit() || "xXhH:.".contains(character);
-    text.starts_with(|first: char| first.is_ascii_digit()) && text.chars().all(is_part)
 }
 
 /// An object by address or by name.
@@ -151,7 +145,7 @@ impl FromStr for ObjectArg {
         if let Ok(object) = text.parse() {
             return Ok(ObjectArg::Address(object));
         }
-        if !text.trim().is_empty() && !is_like_address(text) {
+        if !text.trim().is_empty() && !ObjectId::reads_as_address(text) {
             return Ok(ObjectArg::Name(text.trim().to_owned()));
         }
         Err(format!("\"{text}\" is neither an object (0x1018:1) nor a name (vendor-id, ai-input-pv:1)"))

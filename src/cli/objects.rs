@@ -11,6 +11,7 @@ use crate::node::survey::identify;
 use crate::output::failure::ErrorMessage;
 use crate::output::objects::ObjectFacts;
 use clap::Args;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Show the objects of a device from its description or EDS
@@ -72,7 +73,7 @@ impl Objects {
             return Ok((model, queries));
         }
         match (&self.what, named) {
-            (Some(what), named) if catalog::by_name(what).is_some() || is_file(what) => {
+            (Some(what), named) if catalog::by_name(what).is_some() || is_file(what) || Path::new(what).is_file() => {
                 let own = descriptions::model(what, false, global)?;
                 Ok((named.map_or_else(|| Arc::clone(&own), |eds| Arc::new(own.with_eds(&eds))), queries))
             }
@@ -92,7 +93,7 @@ impl Objects {
 
 fn is_file(what: &str) -> bool {
     let what = what.to_ascii_lowercase();
-    what.contains('/') || [".toml", ".eds", ".dcf"].iter().any(|extension| what.ends_with(extension))
+    [".toml", ".eds", ".dcf"].iter().any(|extension| what.ends_with(extension))
 }
 
 /// The description of the device at a node.

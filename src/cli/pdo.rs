@@ -1,6 +1,6 @@
 //! `cangauge pdo`.
 
-use super::args::{Duration, Nodes, ObjectArg};
+use super::args::{Duration, Nodes};
 use super::exit::{several, stdout};
 use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
@@ -14,7 +14,6 @@ use crate::tasks::log::Remark;
 use crate::tasks::pdo::{Item, PdoRequest, Trigger, WatchEvent, map, show, watch};
 use clap::{Args, Subcommand};
 use std::ops::ControlFlow;
-use std::str::FromStr;
 
 /// Show, change and watch the transmit PDOs of nodes
 ///
@@ -59,7 +58,7 @@ struct MapArgs {
     /// Mapped signals or objects, in order: pressure, pressure.status, ai-input-pv:1, 0x6130:1, 0x9130:1/32 [default:
     /// keep the mapping]
     #[arg(value_name = "SIGNAL|OBJECT")]
-    signals: Vec<MapItem>,
+    signals: Vec<Item>,
     /// Transmission type: acyclic (on SYNC after a change), sync:N (on every N-th SYNC), event (255), timer (event timer),
     /// or a number
     #[arg(long, value_name = "HOW", value_parser = transmission)]
@@ -90,40 +89,6 @@ struct WatchArgs {
 fn tpdo(text: &str) -> Result<TpdoNumber, String> {
     let number = text.parse().ok().and_then(TpdoNumber::new);
     number.ok_or_else(|| format!("\"{text}\" is not the number of a TPDO (1 to 512)"))
-}
-
-/// A signal or object to map, with its number of bits if it was given.
-#[derive(Clone, Debug)]
-struct MapItem(Item);
-
-impl FromStr for MapItem {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<MapItem, String> {
-        let (what, bits) = match text.split_once('/') {
-            None => (text, None),
-            Some((what, bits)) => {
-                let number = bits.parse().ok().filter(|bits| (1..=64).contains(bits));
-                (what, Some(number.ok_or_else(|| format!("\"{text}\": \"{bits}\" is not a number of bits (1 to 64)"))?))
-            }
-        };
-        if what.starts_with(|first: char| first.is_ascii_digit()) {
-            // `4-20-ma-count` is a name.
-            return match what.parse::<ObjectArg>()? {
-                ObjectArg::Address(object) => Ok(MapItem(Item::Object(object, bits))),
-                ObjectArg::Name(name) => Ok(MapItem(Item::Name(name, bits))),
-            };
-        }
-        let bare = what.strip_suffix(".status").unwrap_or(what);
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        let named = bare.starts_with(|first: char| first.is_ascii_alphabetic()) && bare.chars().all(plain);
-        if named || matches!(what.parse(), Ok(ObjectArg::Name(_))) {
-            return Ok(MapItem(Item::Name(what.to_owned(), bits)));
-        }
-        Err(format!(
-            "\"{text}\" is neither a signal (pressure, ch1, pressure.status) nor an object (0x6130:1, 0x9130:1/32)"
-        ))
-    }
 }
 
 fn transmission(text: &str) -> Result<Trigger, String> {
@@ -208,7 +173,7 @@ impl MapArgs {
         let request = PdoRequest {
             node: self.node,
             number: self.pdo,
-            items: self.signals.iter().map(|item| item.0.clone()).collect(),
+            items: self.signals.clone(),
             trigger: self.transmission,
             event_timer_ms: self.event_timer,
             inhibit_100us: self.inhibit,

@@ -74,7 +74,9 @@ impl Read {
     /// Prints the warnings of the readings of one node, and converts the values.
     fn convert(&self, global: &Global, readings: Readings, is_bare: bool) -> Result<Vec<Converted>, Failure> {
         for (target, sample) in &readings {
-            if let Some(doubt) = sample.doubt.filter(|doubt| !is_bare || *doubt != Doubt::UnknownType) {
+            if let Some(doubt) =
+                sample.doubt.filter(|doubt| !is_bare || !matches!(doubt, Doubt::UnknownType | Doubt::NotNumber))
+            {
                 let (node, signal) = (target.source.node, &target.source.signal);
                 global.console().warn(&doubt::doubt(node, signal, doubt));
             }
@@ -107,6 +109,7 @@ fn no_value(target: &Target, sample: &Sample) -> Failure {
     let signal = target.source.signal.to_string();
     let cause = match sample.doubt {
         Some(Doubt::UnknownType) => ReadFailure::TypeUnknown { signal, raw: sample.raw },
+        Some(Doubt::NotNumber) => ReadFailure::NotNumber { signal },
         _ => ReadFailure::Invalid { signal, status: sample.status },
     };
     Failure::at(target.source.node, cause)

@@ -6,7 +6,7 @@ use super::scalar::Scalar;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One entry of the object dictionary.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +48,7 @@ impl Entry {
 pub struct Dictionary {
     entries: BTreeMap<ObjectId, Entry>,
     aliases: BTreeMap<String, ObjectId>,
+    spellings: BTreeMap<String, BTreeSet<ObjectId>>,
 }
 
 impl Dictionary {
@@ -66,6 +67,24 @@ impl Dictionary {
         self.aliases.insert(name, object);
     }
 
+    /// Adds a name as the file spells it. Several objects can have it; letter case and width of blanks are ignored.
+    pub fn insert_spelling(&mut self, name: &str, object: ObjectId) {
+        let name = folded(name);
+        if !name.is_empty() {
+            self.spellings.entry(name).or_default().insert(object);
+        }
+    }
+
+    /// The full names of the objects that share this name in the file, if there are several.
+    pub fn namesakes(&self, name: &str) -> Vec<String> {
+        let alike = self.spellings.iter().filter(|(known, _)| **known == folded(name) || slug(known) == slug(name));
+        let objects: BTreeSet<ObjectId> = alike.flat_map(|(_, objects)| objects.iter().copied()).collect();
+        if objects.len() < 2 {
+            return Vec::new();
+        }
+        objects.into_iter().filter_map(|object| Some(self.get(object)?.full_name())).collect()
+    }
+
     /// The entry at `object`.
     pub fn get(&self, object: ObjectId) -> Option<&Entry> {
         self.entries.get(&object)
@@ -76,10 +95,17 @@ impl Dictionary {
         self.entries.values()
     }
 
-    /// Every name, in lower case, with its object. Full names come last, so that they have priority over aliases.
+    /// Every name, in lower case, with its object. Names come after those over which they have priority.
     pub fn names(&self) -> impl Iterator<Item = (String, ObjectId)> + '_ {
+        let unique = |(name, objects): (&String, &BTreeSet<ObjectId>)| {
+            objects.first().filter(|_| objects.len() == 1).map(|object| (name.clone(), *object))
+        };
         let aliases = self.aliases.iter().map(|(name, object)| (name.clone(), *object));
-        aliases.chain(self.iter().map(|entry| (entry.full_name(), entry.object)))
+        self.spellings
+            .iter()
+            .filter_map(unique)
+            .chain(aliases)
+            .chain(self.iter().map(|entry| (entry.full_name(), entry.object)))
     }
 
     /// Whether the dictionary has no entry.
@@ -95,7 +121,14 @@ impl Dictionary {
     /// The entry with a name: `vendor-id`, `ai-input-pv:1`, or as in an EDS, `Position Value`. Letter case is ignored.
     pub fn find(&self, name: &str) -> Option<&Entry> {
         let exact = self.find_exact(&name.to_lowercase());
-        exact.or_else(|| spellings(name).into_iter().find_map(|name| self.find_exact(&name)))
+        exact
+            .or_else(|| self.find_spelling(name))
+            .or_else(|| spellings(name).into_iter().find_map(|name| self.find_exact(&name)))
+    }
+
+    fn find_spelling(&self, name: &str) -> Option<&Entry> {
+        let objects = self.spellings.get(&folded(name)).filter(|objects| objects.len() == 1)?;
+        self.get(*objects.first()?)
     }
 
     fn find_exact(&self, name: &str) -> Option<&Entry> {
@@ -119,6 +152,11 @@ impl Dictionary {
             });
         }
     }
+}
+
+/// The form in which spellings are compared.
+fn folded(name: &str) -> String {
+    name.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase()
 }
 
 /// The possible names for a name as in an EDS (`Position Value:1`): with sub-index, and as a whole.

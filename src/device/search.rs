@@ -6,7 +6,7 @@ use crate::canopen::object::ObjectId;
 
 impl Model {
     /// The objects that match `query`, in ascending order. `query` is an address (`6130:1`), an index (`6130`), a name,
-    /// or a word in the name, the meaning or the values. Letter case is ignored.
+    /// a name that several objects share, or a word in the name, the meaning or the values. Letter case is ignored.
     pub fn search(&self, query: &str) -> Vec<&Entry> {
         let query = query.trim();
         if let Ok(object) = query.parse::<ObjectId>() {
@@ -19,6 +19,10 @@ impl Model {
         }
         if let Some(entry) = self.dictionary.find(query) {
             return vec![entry];
+        }
+        let shared = self.dictionary.namesakes(query);
+        if !shared.is_empty() {
+            return shared.iter().filter_map(|name| self.dictionary.find(name)).collect();
         }
         let word = query.to_lowercase();
         self.dictionary.iter().filter(|entry| !word.is_empty() && self.mentions(entry, &word)).collect()

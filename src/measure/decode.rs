@@ -41,10 +41,11 @@ impl Layout<'_> {
     /// The signal or object that a requested value means on this node. A name that is not a signal may be the name of
     /// an object.
     pub fn resolve(&self, item: &Wanted) -> Wanted {
-        let Wanted::Signal(name) = item else { return item.clone() };
-        if self.signals.iter().any(|signal| signal.name == *name) {
+        let (Wanted::Signal(signal) | Wanted::Status(signal)) = item else { return item.clone() };
+        if self.signals.iter().any(|known| known.name == *signal) {
             return item.clone();
         }
+        let name = &item.name();
         if let Some(object) = self.part(name) {
             return Wanted::Named(name.clone(), object);
         }

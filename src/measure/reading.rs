@@ -110,6 +110,9 @@ impl Reading {
         let without_value =
             |status, doubt| Sample { at, source: self.source, value: None, status, raw: Raw::new(bytes), doubt };
         let Some(data_type) = self.data_type else { return Some(without_value(None, Some(Doubt::UnknownType))) };
+        if !data_type.is_number() {
+            return Some(without_value(None, Some(Doubt::NotNumber)));
+        }
         let value = data_type.decode(bytes).ok()?;
         let is_integer = matches!(value, Value::Integer(_) | Value::Unsigned(_));
         let (digits, mut doubt) = match self.scaling {

@@ -202,6 +202,8 @@ pub struct Sample {
 pub enum Doubt {
     /// No source states the type of the object. There is no value.
     UnknownType,
+    /// The object is text or bytes. There is no value.
+    NotNumber,
     /// The decimal digits (6132h) are above 9. There is no value.
     ImpossibleDigits(u8),
     /// The decimal digits (6132h) are unknown. The value is the integer.

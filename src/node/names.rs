@@ -97,10 +97,18 @@ impl Node {
         self.layout().resolve(item)
     }
 
+    /// The objects that share this name in the EDS, else those with similar names, the nearest first.
+    pub fn objects_like(&self, name: &str) -> Vec<String> {
+        let Some(model) = &self.model else { return nearest(name, standard::names()) };
+        match model.dictionary.namesakes(name) {
+            shared if shared.is_empty() => nearest(name, model.dictionary.iter().map(Entry::full_name)),
+            shared => shared,
+        }
+    }
+
     /// The names of objects with similar names, then those of the signals.
     pub fn names_like(&self, name: &str) -> Vec<String> {
-        let objects = self.model.iter().flat_map(|model| model.dictionary.iter()).map(Entry::full_name);
-        let mut names = nearest(name, objects);
+        let mut names = self.objects_like(name);
         names.extend(self.signals.iter().map(|signal| signal.name.clone()));
         let mut seen = BTreeSet::new();
         names.retain(|name| seen.insert(name.clone()));
@@ -157,15 +165,12 @@ pub fn resolve(master: &mut Master<'_>, node: &mut Node, name: &str) -> Result<O
     if let Some(entry) = node.entry_by_name(name) {
         return Ok(entry.object);
     }
-    let known: Vec<String> = match &node.model {
-        Some(model) => model.dictionary.iter().map(Entry::full_name).collect(),
-        None => standard::names().collect(),
-    };
     Err(Error::Name(NameError {
         node: node.id,
         name: name.to_owned(),
         title: node.model.as_ref().map(|model| model.description.title.clone()),
-        nearest: nearest(name, known.into_iter()),
+        is_shared: node.model.as_ref().is_some_and(|model| !model.dictionary.namesakes(name).is_empty()),
+        nearest: node.objects_like(name),
     }))
 }
 

@@ -8,6 +8,9 @@ use crate::measure::sample::Doubt;
 pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
     match doubt {
         Doubt::UnknownType => format!("node {node}: {}; {}", unknown_type(signal), type_remedy(node, signal)),
+        Doubt::NotNumber => {
+            format!("node {node}: {signal}: no value: it is text or bytes; read it: cangauge sdo read {node} {signal}")
+        }
         Doubt::ImpossibleDigits(digits) => {
             format!("node {node}: {signal}: no value: 6132h is {digits}; valid are 0 to 9 decimal digits")
         }

@@ -53,7 +53,7 @@ fn free(name: &str, fallback: &str, used: &mut BTreeSet<String>) -> String {
     let words: String = name.chars().map(plain).collect();
     let words: Vec<&str> = words.split('-').filter(|word| !word.is_empty()).collect();
     let mut name = words.join("-");
-    if name.is_empty() || name.parse::<ObjectId>().is_ok() {
+    if name.is_empty() || ObjectId::reads_as_address(&name) {
         name = fallback.to_owned();
     }
     let base = name.clone();

@@ -6,6 +6,7 @@ pub use failure::CheckFailure;
 
 use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
+use crate::canopen::value::DataType;
 use crate::master::{Error, Master};
 use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
@@ -17,7 +18,7 @@ use crate::node::survey::survey_each;
 use crate::node::{Node, Overrides};
 use crate::tasks::Failure;
 use crate::tasks::log::{self, LogEvent, Mode, Observer, RecordingReport, Remark, log};
-use crate::tasks::read::{Target, requests, sample, targets};
+use crate::tasks::read::{ReadFailure, Target, requests, sample, targets};
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -192,7 +193,12 @@ fn wanted_targets(nodes: &[Node], evaluator: &Evaluator) -> Result<Vec<Target>, 
 
 /// A verdict needs a value, and a value needs a type.
 fn refuse_unknown_types(targets: &[Target]) -> Result<(), Failure> {
-    match targets.iter().find(|target| target.reading.data_type().is_none()) {
+    let without_number = |target: &&Target| !target.reading.data_type().is_some_and(DataType::is_number);
+    match targets.iter().find(without_number) {
+        Some(target) if target.reading.data_type().is_some() => {
+            let signal = target.source.signal.to_string();
+            Err(Failure::at(target.source.node, ReadFailure::NotNumber { signal }))
+        }
         Some(target) => Err(unknown_type(&target.source)),
         None => Ok(()),
     }

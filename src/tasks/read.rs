@@ -157,9 +157,11 @@ pub fn sample(
         operation: crate::master::Operation::Read,
         failure: SdoFailure::NotANumber,
     };
-    let Some(data_type) = target.reading.data_type() else {
-        // Bytes of unknown type stay bytes.
+    let Some(data_type) = target.reading.data_type().filter(|data_type| data_type.is_number()) else {
+        // Bytes without a known type stay bytes. A sample has no place for a long text.
         let bytes = answer.uploaded.as_ref().map(|uploaded| uploaded.bytes.as_slice()).unwrap_or_default();
+        let is_text = target.reading.data_type().is_some();
+        let bytes = if is_text && bytes.len() > 8 { &[] } else { bytes };
         let sample = target.reading.sample(answer.at, bytes, None).filter(|_| bytes.len() <= 8);
         return sample.ok_or_else(not_a_number);
     };

@@ -136,6 +136,54 @@ fn text_that_is_not_an_address_is_a_name() {
     assert!(done.stdout.contains(",1,heartbeat,0,"), "{}", done.stdout);
 }
 
+const SPELLINGS: &str = include_str!("../data/eds/31-spellings.eds");
+
+#[test]
+fn names_are_typed_as_the_eds_spells_them() {
+    let bench = bench_with("x.eds@5", &[("x.eds", SPELLINGS.to_owned())]);
+    let run = |words: &[&str]| bench.run_words(&[&["--eds", "x.eds", "-q"], words].concat());
+    for (name, value) in [
+        ("Pressure / Temperature", "10"),
+        ("Value < 3", "11"),
+        ("Value # 3", "12"),
+        ("+offset", "13"),
+        ("Offset", "14"),
+        ("Face", "15"),
+        ("100", "16"),
+        ("***", "18"),
+        ("pump.status", "19"),
+        ("Level:2", "21"),
+    ] {
+        for command in [&["sdo", "read", "5"][..], &["read", "5"]] {
+            let done = run(&[command, &[name]].concat()).exit(0);
+            assert_eq!(done.stdout.trim(), value, "{command:?} {name}");
+        }
+        let done = run(&["log", "5", name, "--poll", "50ms", "--count", "1"]).exit(0);
+        assert!(done.stdout.contains(&format!(",{value},")), "{name}: {}", done.stdout);
+        run(&["check", "5", &format!("\"{name}\" == {value}")]).exit(0);
+        run(&["pdo", "map", "5", "1", name]).exit(0);
+        run(&["objects", name]).exit(0);
+    }
+    let done = run(&["sdo", "read", "5", "Value"]).exit(2);
+    let expected = "several objects have the name \"Value\"\nhint: name one: sensor-a:1, sensor-b:1\n";
+    assert!(done.stderr.ends_with(expected), "{}", done.stderr);
+    let done = run(&["objects", "value"]).exit(0);
+    assert!(done.stdout.contains("sensor-a:1") && done.stdout.contains("sensor-b:1"), "{}", done.stdout);
+    let done = run(&["read", "5", "Value"]).exit(2);
+    assert!(done.stderr.contains("(it has: sensor-a:1, sensor-b:1"), "{}", done.stderr);
+}
+
+#[test]
+fn mapped_text_has_no_number_and_hides_no_other_signal() {
+    let bench = bench_with("x.eds@5", &[("x.eds", SPELLINGS.to_owned())]);
+    let done = bench.run("--eds x.eds read 5").exit(0);
+    assert!(done.stdout.contains("pressure-temperature  10"), "{}", done.stdout);
+    assert!(done.stderr.contains("serial-text: no value: it is text or bytes"), "{}", done.stderr);
+    let done = bench.run("--eds x.eds read 5 serial-text").exit(2);
+    assert!(done.stderr.contains("hint: cangauge sdo read 5 serial-text"), "{}", done.stderr);
+    bench.run_words(&["--eds", "x.eds", "check", "5", "serial-text == 3"]).exit(2);
+}
+
 #[test]
 fn an_expression_uses_the_names_of_an_eds() {
     let bench = bench_with("mh4@1", &[("x.eds", eds(0x47, 1, &NAMES))]);
@@ -241,4 +289,52 @@ fn description_of_another_vendor_is_used_only_if_its_types_are_those_of_cia_404(
             }
         }
     }
+}
+
+/// The names that the completion offers after these words.
+fn completed(bench: &Bench, words: &[&str]) -> Vec<String> {
+    let done = bench.run_words(&[&["completions", "--"], words].concat()).exit(0);
+    done.stdout.lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn completion_offers_names_of_descriptions_and_files() {
+    let bench = bench_with("x.eds@5", &[("x.eds", SPELLINGS.to_owned())]);
+    let offers = |words: &[&str], names: &[&str]| {
+        let found = completed(&bench, words);
+        names.iter().for_each(|name| assert!(found.iter().any(|found| found == name), "{words:?} {name}: {found:?}"));
+    };
+    for command in [&["log"][..], &["read"], &["check"], &["sdo", "read"], &["sdo", "write"], &["objects"]] {
+        let words = [&["--eds", "x.eds"], command, &["5", "sen"]].concat();
+        assert_eq!(completed(&bench, &words), ["sensor-a:0", "sensor-a:1", "sensor-b:0", "sensor-b:1"], "{words:?}");
+    }
+    offers(&["pdo", "map", "5", "1", "--eds=5=x.eds", "pump"], &["pump-status"]);
+    offers(&["objects", "x.eds", "lev"], &["level-2"]);
+    offers(&["read", "5", ""], &["pressure", "temperature", "producer-heartbeat-time"]);
+    offers(&["--device", "mh4", "log", "5", "--sync", "10ms", "ai-input-pv:"], &["ai-input-pv:1"]);
+    offers(&["log", "5", "--device", "d"], &["d20", "dps"]);
+    offers(&["read", "5", "--device=m"], &["--device=mh4"]);
+    offers(&["read", "5", "pressure", "--in", "k"], &["kPa"]);
+    offers(&["unit", "5", "pressure", "p"], &["psi"]);
+    offers(&["devices", "show", "hy"], &["hydac"]);
+    for words in [&["lo"][..], &["log", "1"], &["read", "5", "--eds", "x"], &["--eds", "none.eds", "-t", ""]] {
+        assert_eq!(completed(&bench, words), [""; 0], "{words:?}");
+    }
+}
+
+#[test]
+fn bash_completes_names_with_colons() {
+    let bench = bench_with("x.eds@5", &[("x.eds", SPELLINGS.to_owned())]);
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_cangauge"));
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/completions/cangauge.bash");
+    let text = format!(
+        "PATH={}:$PATH; source {script}; COMP_LINE='cangauge --eds x.eds read 5 sensor-a:'; COMP_POINT=${{#COMP_LINE}}; \
+         COMP_WORDS=(cangauge --eds x.eds read 5 sensor-a :); COMP_CWORD=6; _cangauge_names cangauge : sensor-a; \
+         printf '%s\\n' \"${{COMPREPLY[@]}}\"",
+        program.parent().expect("a folder").display()
+    );
+    let done = std::process::Command::new("bash").args(["-c", &text]).current_dir(bench.path("")).output();
+    let output = done.expect("bash").stdout;
+    let found = String::from_utf8_lossy(&output).into_owned();
+    assert!(found.lines().any(|line| line == "1") && found.lines().any(|line| line == "0"), "{found}");
 }

@@ -80,7 +80,7 @@ fn characters(table: &Table<'_>, name: &str) -> bool {
 
 /// Reports the name of a signal or an object that could be an address.
 fn name(table: &Table<'_>, name: &str) {
-    if characters(table, name) && name.parse::<ObjectId>().is_ok() {
+    if characters(table, name) && ObjectId::reads_as_address(name) {
         table.mistake("name", format!("name: \"{name}\" would be read as an address"));
     }
 }

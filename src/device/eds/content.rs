@@ -4,6 +4,7 @@ use super::ini::Section;
 use super::names::Described;
 use super::objects::Reader;
 use super::text::quoted;
+use super::value::Reading;
 use super::{ObjectFlags, value};
 use crate::canopen::id::NodeId;
 use crate::canopen::value::DataType;
@@ -130,7 +131,7 @@ impl Reader<'_> {
             }
             return (DataType::Domain, true);
         };
-        let code = self.integer(section, "DataType").and_then(|code| u16::try_from(code).ok());
+        let code = self.checked(section, "DataType", value::type_code).and_then(|code| u16::try_from(code).ok());
         let known = code.and_then(|code| DataType::from_code(code).or_else(|| self.defined_type(code)));
         match known {
             Some(data_type) => (data_type, true),
@@ -170,8 +171,12 @@ impl Reader<'_> {
 
     /// An integer, with a warning if it is doubtful.
     pub(super) fn integer(&mut self, section: &Section, key: &str) -> Option<i128> {
+        self.checked(section, key, value::integer)
+    }
+
+    fn checked(&mut self, section: &Section, key: &str, parse: impl Fn(&str) -> Option<Reading<i128>>) -> Option<i128> {
         let item = section.get(&key.to_ascii_lowercase())?;
-        let reading = value::integer(&item.value)?;
+        let reading = parse(&item.value)?;
         if let Some(doubt) = reading.doubt {
             self.warn(item.line, format!("[{}] {key}: {doubt}", section.shown));
         }

@@ -172,6 +172,7 @@ pub fn read(bytes: &[u8]) -> Result<Eds, EdsError> {
 
 /// The index of the object in the name of its section: `1018`, `1018sub1`, `1018Name`.
 fn section_index(name: &str) -> Option<u16> {
+    let name = name.strip_prefix("0x").unwrap_or(name);
     let digits = name.get(..4)?;
     let is_object = name.len() == 4 || name[4..].starts_with(['s', 'S', 'n', 'N', 'v', 'V', 'd', 'D']);
     u16::from_str_radix(digits, 16).ok().filter(|_| is_object)

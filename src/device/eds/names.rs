@@ -7,10 +7,11 @@
 //! - An element of an array is `object:1`, as in device descriptions: `ai-input-pv:1`.
 //! - A member of a record has its own name if that is unique in the file (`vendor-id`), else `object:1`
 //!   (`tpdo-1-parameter:1`; every PDO has a "COB-ID"). Sub-index 0, the count, is always `object:0`.
-//! - The index is appended to a name that two objects have, or that reads as a hexadecimal index ("Add", "Face"):
-//!   `reserved-2005`.
+//! - The index is appended to a name that two objects have, or that reads as an address ("6130"): `reserved-2005`.
 //! - A sub-object has a second name if that is unique: `identity-object:1`, and `ai-input-pv-1` in an array. An object
 //!   with a user's name in a DCF (`Denotation`) also has a second name.
+//!
+//! - The spelling of the file is a name too if it is unique: [`Dictionary::insert_spelling`].
 //!
 //! No two entries have the same name, and [`Dictionary::find`] finds each by its [`Entry::full_name`].
 
@@ -45,6 +46,9 @@ pub(super) enum Kind {
 
 /// Names the entries; `objects` has the names of the objects in the file.
 pub(super) fn dictionary(objects: &BTreeMap<u16, String>, described: Vec<Described>) -> Dictionary {
+    let titles = objects;
+    let subs = described.iter().map(|described| described.entry.object).filter(|object| object.sub > 0);
+    let with_subs: HashSet<u16> = subs.map(|object| object.index).collect();
     let slugs: BTreeMap<u16, String> = objects.iter().map(|(index, name)| (*index, slug(name))).collect();
     let objects = object_names(&slugs);
     let mut taken: HashSet<String> = slugs.into_values().chain(objects.values().cloned()).collect();
@@ -60,6 +64,11 @@ pub(super) fn dictionary(objects: &BTreeMap<u16, String>, described: Vec<Describ
         let own_name = own_name.filter(|name| own.get(name) == Some(&1) && is_free(name, &taken));
         let parent = objects.get(&object.index).cloned().unwrap_or_else(|| nameless(object.index));
         let mut alias = None;
+        dictionary.insert_spelling(&entry.name, object);
+        if let Some(title) = titles.get(&object.index).filter(|_| object.sub > 0 || !with_subs.contains(&object.index))
+        {
+            dictionary.insert_spelling(title, object);
+        }
         match (kind, own_name) {
             (Kind::Variable, _) => (entry.name, entry.numbered) = (parent, false),
             (Kind::Record, Some(name)) => {
@@ -101,11 +110,7 @@ fn count<'a>(names: impl Iterator<Item = &'a str>) -> HashMap<String, u32> {
 
 /// Whether a name is free for one sub-object: it is not empty, no object has it, and it is not an index.
 fn is_free(name: &str, taken: &HashSet<String>) -> bool {
-    !name.is_empty() && !taken.contains(name) && !is_index(name)
-}
-
-fn is_index(name: &str) -> bool {
-    name.parse::<ObjectId>().is_ok()
+    !name.is_empty() && !taken.contains(name) && !ObjectId::reads_as_address(name)
 }
 
 /// A unique name for every object: its own name, with the index appended if necessary.
@@ -116,7 +121,7 @@ fn object_names(slugs: &BTreeMap<u16, String>) -> BTreeMap<u16, String> {
         let nameless = slug.is_empty();
         let mut name = if nameless { self::nameless(*index) } else { slug.clone() };
         let others = counts.get(&name).copied().unwrap_or_default().saturating_sub(u32::from(!nameless));
-        let mut clashes = others > 0 || is_index(&name);
+        let mut clashes = others > 0 || ObjectId::reads_as_address(&name);
         // Only a name in the file that already ends with this index can clash again.
         while clashes {
             name = format!("{name}-{index:04x}");
@@ -216,14 +221,20 @@ mod tests {
     #[test]
     fn ambiguous_names_get_the_index() {
         let (dictionary, names) = names(
-            &[(0x1800, "TPDO parameter"), (0x1801, "TPDO parameter"), (0x2000, "Limit"), (0x2001, "Add"), (0x2002, "")],
+            &[
+                (0x1800, "TPDO parameter"),
+                (0x1801, "TPDO parameter"),
+                (0x2000, "Limit"),
+                (0x2001, "6130"),
+                (0x2002, ""),
+            ],
             vec![
                 described(0x1800, 1, Kind::Record, "COB-ID"),
                 described(0x1800, 2, Kind::Record, "Type"),
                 described(0x1801, 1, Kind::Record, "COB-ID"),
                 described(0x2000, 0, Kind::Variable, ""),
                 described(0x2001, 1, Kind::Record, "Limit"),
-                described(0x2001, 2, Kind::Record, "Dead"),
+                described(0x2001, 2, Kind::Record, "1A00"),
                 described(0x2002, 0, Kind::Variable, ""),
             ],
         );
@@ -234,8 +245,8 @@ mod tests {
                 "type",
                 "tpdo-parameter-1801:1",
                 "limit",
-                "add-2001:1",
-                "add-2001:2",
+                "6130-2001:1",
+                "6130-2001:2",
                 "object-2002"
             ]
         );

@@ -76,6 +76,7 @@ fn role(name: &str) -> Role {
     if let Some(index) = name.strip_suffix("denotation").and_then(four_digits) {
         return Role::Denotations(index);
     }
+    let name = name.strip_prefix("0x").unwrap_or(name);
     let digits = name.bytes().take_while(u8::is_ascii_hexdigit).count();
     let (index, rest) = name.split_at(digits);
     let Some(index) = four_digits(index) else {
@@ -152,6 +153,8 @@ mod tests {
             ("1018", "1018"),
             ("60fe", "60fe"),
             ("1018sub1", "1018:1"),
+            ("0x1018", "1018"),
+            ("0x1018sub1", "1018:1"),
             ("1a00sub0a", "1a00:10"),
             ("1a00subff", "1a00:255"),
             ("1f80name", "1f80 names"),

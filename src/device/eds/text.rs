@@ -8,13 +8,15 @@ const CP1252_80: [char; 32] = [
 
 /// The text of a file, with `\n` at the end of every line.
 ///
-/// CiA 306 allows ISO 646 only. Real files are UTF-8, with or without byte order mark, UTF-16 with a mark, or
-/// Windows-1252. A file that is not valid UTF-8 is read as Windows-1252. Control characters become U+FFFD, so that a
+/// CiA 306 allows ISO 646 only. Real files are UTF-8 or UTF-16, with or without byte order mark, or Windows-1252. A file that is not valid UTF-8 is read as Windows-1252. Control characters become U+FFFD, so that a
 /// name cannot move the cursor of a terminal. ^Z and zeros at the end of a file (DOS, a full disk) are removed.
 pub(super) fn decode(bytes: &[u8]) -> String {
     let text = match bytes {
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        // Without a mark: the first two characters are ASCII.
+        [first, 0, second, 0, ..] if *first > 0 && *second > 0 => utf16(bytes, u16::from_le_bytes),
+        [0, first, 0, second, ..] if *first > 0 && *second > 0 => utf16(bytes, u16::from_be_bytes),
         [0xef, 0xbb, 0xbf, rest @ ..] => utf8_or_cp1252(rest),
         _ => utf8_or_cp1252(bytes),
     };
@@ -77,6 +79,7 @@ mod tests {
         assert_eq!(decode(b"[Ger\xe4t]\nDruck=5 \xb5m\n"), text);
         assert_eq!(decode(&little), text);
         assert_eq!(decode(&big), text);
+        assert_eq!((decode(&little[2..]), decode(&big[2..])), (text.to_owned(), text.to_owned()));
     }
 
     #[test]

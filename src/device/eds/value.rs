@@ -20,10 +20,20 @@ impl<T> Reading<T> {
     }
 }
 
-/// A value; if that fails, the value without a comment after it. CiA 306 does not allow such comments, but real files
-/// contain them.
+/// A value; if that fails, the value without a comment after it, or without quotes around it. CiA 306 allows neither, but
+/// real files contain them.
 fn tolerant<T>(text: &str, parse: impl Fn(&str) -> Option<T>) -> Option<T> {
-    parse(text).or_else(|| without_comment(text).and_then(parse))
+    let plain = |text: &str| parse(text).or_else(|| parse(text.strip_prefix('"')?.strip_suffix('"')?.trim()));
+    plain(text).or_else(|| without_comment(text).and_then(plain))
+}
+
+/// The code of a data type: a number, or hexadecimal digits without `0x` (`1B`, `0003h`).
+pub(super) fn type_code(text: &str) -> Option<Reading<i128>> {
+    let hex = |text: &str| {
+        let value = plain_integer(&format!("0x{}", text.strip_suffix(['h', 'H']).unwrap_or(text)))?.value;
+        Some(Reading { value, doubt: Some(format!("{} is read as 0x{value:04X}", quoted(text))) })
+    };
+    integer(text).or_else(|| tolerant(text, hex))
 }
 
 /// An integer: decimal, `0x…`, or octal with a leading zero. A comment after it is ignored.

@@ -25,16 +25,28 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
             .hint(format!("add the type: cangauge sdo write {node} {object} VALUE --type u32 (or i16, r32, vs)")),
         Error::Name(error) => {
             let source = error.title.as_deref().unwrap_or("the standard");
-            let words = Words::new(format!("{source} has no object \"{}\"", error.name));
-            match error.nearest.is_empty() {
-                true => words,
-                false => words.hint(format!("similar names: {}", error.nearest.join(", "))),
-            }
+            no_such_object(source, &error.name, &error.nearest, error.is_shared)
         }
         Error::Restarted(_) => Words::new("the device restarted"),
         Error::NoBootUp(_) => Words::new("no boot-up message after the reset").hint(below::check_node(failure.node)),
     }
 }
+
+/// A name that no object has, or that several objects share; then `alike` has their full names.
+fn no_such_object(source: &str, name: &str, alike: &[String], is_shared: bool) -> Words {
+    let names = alike.iter().take(MOST_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let more = if alike.len() > MOST_NAMES { ", ..." } else { "" };
+    match (alike.is_empty(), is_shared) {
+        (true, _) => Words::new(format!("{source} has no object \"{name}\"")),
+        (_, false) => Words::new(format!("{source} has no object \"{name}\"")).hint(format!("similar names: {names}")),
+        (_, true) => {
+            Words::new(format!("several objects have the name \"{name}\"")).hint(format!("name one: {names}{more}"))
+        }
+    }
+}
+
+/// Most names in a hint.
+const MOST_NAMES: usize = 5;
 
 /// A value; bytes in wire order.
 pub(super) fn shown(value: &Value) -> String {

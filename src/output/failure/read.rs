@@ -30,6 +30,13 @@ pub(super) fn words(failure: &Failure, cause: &ReadFailure) -> Words {
         ReadFailure::NotConvertible { signal, from: Some(from), to } => {
             Words::new(format!("{signal} is in {from}, which does not convert to {to}"))
         }
+        ReadFailure::NotNumber { signal } => {
+            let words = Words::new(format!("{signal} is text or bytes, not a number"));
+            match failure.node {
+                Some(node) => words.hint(format!("cangauge sdo read {node} {signal}")),
+                None => words,
+            }
+        }
         ReadFailure::TypeUnknown { signal, raw } => {
             let words = Words::new(format!("{} (received {})", unknown_type(signal), wire_bytes(raw.bytes())));
             match failure.node {

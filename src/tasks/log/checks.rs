@@ -24,10 +24,9 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
                 let signals = nodes.iter().flat_map(|node| &node.signals);
                 signals.filter(|signal| signal.name == name).any(|signal| !with_status || signal.status.is_some())
             };
-            let name = match item {
-                Wanted::Signal(name) | Wanted::Status(name)
-                    if !has(name, false) && nodes.iter().all(|node| node.wanted(item) == *item) =>
-                {
+            let meant = nodes.iter().map(|node| node.wanted(item)).find(|meant| meant != item);
+            let name = match meant.as_ref().unwrap_or(item) {
+                Wanted::Signal(name) | Wanted::Status(name) if !has(name, false) => {
                     return Err(Failure::general(unknown_signal(name, nodes)));
                 }
                 Wanted::Status(name) if !has(name, true) => {

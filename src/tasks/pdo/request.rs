@@ -14,6 +14,7 @@ use crate::node::Node;
 use crate::node::names::nearest;
 use crate::tasks::read::ReadFailure;
 use crate::tasks::{Failure, Note};
+use std::str::FromStr;
 
 /// The transmission type for the event timer, unless the description has another one.
 const TIMER: u8 = 254;
@@ -153,6 +154,30 @@ fn check_length(node: NodeId, bits: u32) -> Result<(), Failure> {
     if bits <= MAX_BITS { Ok(()) } else { Err(Failure::at(node, PdoFailure::TooLong { bits })) }
 }
 
+impl FromStr for Item {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Item, String> {
+        let text = text.trim();
+        let (what, bits) = match text.rsplit_once('/') {
+            Some((what, bits)) if what.parse::<ObjectId>().is_ok() || bits.parse::<u64>().is_ok() => (what, Some(bits)),
+            _ => (text, None),
+        };
+        let number = |bits: &str| {
+            let number = bits.parse().ok().filter(|bits| (1..=64).contains(bits));
+            number.ok_or_else(|| format!("\"{text}\": \"{bits}\" is not a number of bits (1 to 64)"))
+        };
+        let bits = bits.map(number).transpose()?;
+        match what.parse() {
+            Ok(object) => Ok(Item::Object(object, bits)),
+            Err(_) if !what.is_empty() && !ObjectId::reads_as_address(what) => Ok(Item::Name(what.to_owned(), bits)),
+            Err(_) => Err(format!(
+                "\"{text}\" is neither a signal (pressure, ch1, pressure.status) nor an object (0x6130:1, 0x9130:1/32)"
+            )),
+        }
+    }
+}
+
 /// The object of a signal, of its status, or with a name of the description or the standard.
 fn named(node: &Node, name: &str) -> Result<ObjectId, Failure> {
     if let Some(signal) = node.signal(name) {
@@ -173,16 +198,12 @@ fn named(node: &Node, name: &str) -> Result<ObjectId, Failure> {
 /// # Errors
 /// Unknown names, wrong numbers of bits, objects of unknown width.
 pub(in crate::tasks) fn entry_of(node: &Node, text: &str) -> Result<MappingEntry, Failure> {
-    let (what, bits) = match text.split_once('/') {
-        None => (text, None),
-        Some((what, bits)) => (what, Some(bits.parse().ok().filter(|bits| (1..=64).contains(bits)))),
+    let (object, bits) = match text.parse() {
+        Ok(Item::Object(object, bits)) => (object, bits),
+        Ok(Item::Name(name, bits)) => (named(node, &name)?, bits),
+        Err(_) => return Err(Failure::at(node.id, unknown_name(node, text))),
     };
-    let is_address = what.starts_with(|first: char| first.is_ascii_digit());
-    let object = match is_address {
-        true => what.parse().map_err(|_| Failure::at(node.id, unknown_name(node, what)))?,
-        false => named(node, what)?,
-    };
-    match bits.unwrap_or_else(|| width(node, object)) {
+    match bits.or_else(|| width(node, object)) {
         Some(bits) => Ok(MappingEntry { object, bits }),
         None => Err(Failure::at(node.id, PdoFailure::WidthUnknown { object })),
     }
@@ -205,7 +226,9 @@ fn unknown_name(node: &Node, name: &str) -> PdoFailure {
         .cloned()
         .chain(with_status.map(|signal| format!("{}.status", signal.name)))
         .chain(objects.map(|entry| entry.full_name()));
-    PdoFailure::UnknownName { name: name.to_owned(), nearest: nearest(name, known), signals }
+    let shared = node.model.as_ref().map(|model| model.dictionary.namesakes(name)).unwrap_or_default();
+    let nearest = if shared.is_empty() { nearest(name, known) } else { shared };
+    PdoFailure::UnknownName { name: name.to_owned(), nearest, signals }
 }
 
 /// The object to map for a signal: its process value. If the description does not allow this, another object with the

@@ -30,6 +30,11 @@ pub enum ReadFailure {
         /// The requested unit.
         to: Unit,
     },
+    /// The object is text or bytes.
+    NotNumber {
+        /// The object, as it was named.
+        signal: String,
+    },
     /// The type of the object is unknown.
     TypeUnknown {
         /// The object as entered by the user.
@@ -54,6 +59,7 @@ impl ReadFailure {
             ReadFailure::NoSignal { .. }
             | ReadFailure::NoStatus { .. }
             | ReadFailure::NotConvertible { .. }
+            | ReadFailure::NotNumber { .. }
             | ReadFailure::TypeUnknown { .. } => Kind::Usage,
         }
     }
