@@ -6538,3 +6538,18 @@ if [[ "${BASH_VERSINFO[0]}" -eq 4 && "${BASH_VERSINFO[1]}" -ge 4 || "${BASH_VERS
 else
     complete -F _cangauge -o bashdefault -o default cangauge
 fi
+
+# Names of signals, objects, devices and units come from the program. COMP_WORDS would split ai-input-pv:1.
+_cangauge_names() {
+    _cangauge "$@"
+    local -a line
+    local text="${COMP_LINE:0:COMP_POINT}" word name
+    read -ra line <<< "$text"
+    [[ "$text" == *[[:space:]] ]] && line+=("")
+    word="${line[${#line[@]} - 1]}"
+    while IFS= read -r name; do
+        COMPREPLY+=("${name#"${word%"${word##*:}"}"}")
+    done < <(cangauge completions -- "${line[@]:1}" 2>/dev/null)
+}
+
+complete -F _cangauge_names -o bashdefault -o default cangauge

@@ -1788,7 +1788,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l pace -
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s v -l verbose -d 'Print more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
@@ -1850,3 +1850,6 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "show" -d 'Print a description as TOML'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "new" -d 'Print a first description of a device from the device and its EDS (--eds); comments mark missing parts'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "check" -d 'Report each mistake in a description file with its line'
+
+# Names of signals, objects, devices and units come from the program.
+complete -c cangauge -a '(cangauge completions -- (commandline -opc)[2..-1] (commandline -ct) 2>/dev/null)'

@@ -2,10 +2,11 @@
 //!
 //! `UPDATE_GENERATED=1 cargo test --test generated` rewrites them.
 
-use cangauge::cli::{Cli, program};
+use cangauge::cli::completions::script;
+use cangauge::cli::program;
 use cangauge::device::description;
 use cangauge::sim::Bench;
-use clap::{Command, CommandFactory};
+use clap::Command;
 use clap_complete::Shell;
 use clap_mangen::Man;
 use std::collections::BTreeMap;
@@ -25,11 +26,6 @@ type Files = BTreeMap<String, Vec<u8>>;
 
 fn completions() -> Files {
     let names = [(Shell::Bash, "cangauge.bash"), (Shell::Zsh, "_cangauge"), (Shell::Fish, "cangauge.fish")];
-    let script = |shell| {
-        let mut script = Vec::new();
-        clap_complete::generate(shell, &mut Cli::command(), "cangauge", &mut script);
-        script
-    };
     names.into_iter().map(|(shell, name)| (name.to_owned(), script(shell))).collect()
 }
 

@@ -4,7 +4,7 @@ pub mod args;
 mod autozero;
 mod bus;
 mod check;
-mod completions;
+pub mod completions;
 mod config;
 mod descriptions;
 mod devices;
