@@ -39,7 +39,9 @@ pub(super) fn checks(spec: &Spec, run: &mut Run, violations: &mut Vec<Violation>
         }
         let of_node = run.observed.rows.iter().map(|row| row.split(',').collect::<Vec<_>>());
         let of_node = of_node.filter(|cells| cells[1] == node.to_string() && cells[2] == limits.signal);
-        let values: Vec<Option<f64>> = of_node.map(|cells| cells[3].parse().ok()).collect();
+        let is_valid = |cells: &Vec<&str>| !cells[5].starts_with("overload");
+        let values: Vec<Option<f64>> =
+            of_node.map(|cells| cells[3].parse().ok().filter(|_| is_valid(&cells))).collect();
         let ruling = match values.as_slice() {
             [] => Outcome::NoData,
             values if values.iter().all(|value| value.is_some_and(is_satisfied)) => Outcome::Ok,

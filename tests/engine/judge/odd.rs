@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::odd::{Mute, Oddity};
+use cangauge::canopen::frame::Frame;
 use cangauge::output::failure::ErrorMessage;
 
 /// Compares the result with the oddity of the device.
@@ -57,26 +58,34 @@ fn twins(node: u8, run: &Run, violations: &mut Vec<Violation>) {
     };
     let row = run.observed.rows.iter().find(has_value);
     violations.extend(row.map(|row| ("odd: no value of two devices", row.clone())));
-    let answers = |object: ObjectId| {
-        let [low, high] = object.index.to_le_bytes();
-        let sent = run.bus.bus.inner().stations::<FaultyDevice>().flat_map(|station| &station.sent);
-        let frames =
-            sent.filter_map(|(_, frame)| frame.all_eight().filter(|_| frame.id().sdo_response_node().is_some()));
-        frames
-            .filter(|data| data[1..4] == [low, high, object.sub])
-            .map(|data| data[4..].to_vec())
-            .collect::<BTreeSet<_>>()
-    };
+    // Answers that collide arrive later, or never: a device may be bus-off meanwhile.
+    let sent = run.bus.bus.inner().stations::<FaultyDevice>().flat_map(|station| &station.sent);
+    let answers: Vec<_> = sent
+        .filter(|(at, frame)| *at <= run.ended && frame.id().sdo_response_node().is_some_and(|from| from.get() == node))
+        .collect();
     if let Ok(Claim::Values(values)) = &run.result {
-        let differs = values.iter().find(|(_, object, _)| answers(*object).len() > 1);
+        let contents = |object: ObjectId| {
+            let [low, high] = object.index.to_le_bytes();
+            let data = answers.iter().filter_map(|(_, frame)| frame.all_eight());
+            let data = data.filter(|data| data[1..4] == [low, high, object.sub]);
+            data.map(|data| data[4..].to_vec()).collect::<BTreeSet<_>>()
+        };
+        let differs = values.iter().find(|(_, object, _)| contents(*object).len() > 1);
         violations.extend(differs.map(|value| ("odd: no value of two devices", format!("{value:?}"))));
     }
-    let is_write = |(_, frame): &(Mono, cangauge::canopen::frame::Frame)| {
-        frame.id().sdo_request_node().is_some_and(|to| to.get() == node)
-            && frame.data().first().is_some_and(|first| first >> 5 == 1)
-    };
-    let write = run.bus.all_sent().into_iter().find(is_write);
-    violations.extend(write.map(|(_, frame)| ("odd: no write to two devices", frame.to_string())));
+    let requests = run.bus.all_sent();
+    let requests =
+        requests.iter().filter(|(_, frame)| frame.id().sdo_request_node().is_some_and(|to| to.get() == node));
+    let write = requests.clone().find(|(_, frame)| frame.data().first().is_some_and(|first| first >> 5 == 1));
+    let Some((written, frame)) = write else { return };
+    // The serial numbers differ. The bus may deliver one answer only.
+    let is_serial = |frame: &Frame| frame.data().get(1..4) == Some(&[0x18, 0x10, 4]);
+    let is_asked = requests.clone().any(|(at, frame)| at < written && is_serial(frame));
+    let serials = answers.iter().filter(|(at, frame)| at < written && is_serial(frame));
+    let is_single = is_asked && serials.count() == 1;
+    if !is_single {
+        violations.push(("odd: no write to two devices", frame.to_string()));
+    }
 }
 
 /// The reason for the silence is the real one.
