@@ -269,7 +269,6 @@ impl Command {
             Command::Scan(_) | Command::Read(_) | Command::Info(_) | Command::Doctor(_) => true,
             Command::Objects(_) | Command::Devices(_) | Command::Export(_) => true,
             Command::Sdo(sdo) => sdo.only_reads(),
-            Command::Config(config) => config.only_reads(),
             _ => false,
         }
     }

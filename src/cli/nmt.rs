@@ -213,7 +213,7 @@ fn probe_unknown(master: &mut Master<'_>, global: &Global, reports: &mut [StateR
     let is_unknown = |report: &&mut StateReport| report.is_present && report.by == Proof::None;
     let mut unknown: Vec<&mut StateReport> = reports.iter_mut().filter(is_unknown).collect();
     let ids: Vec<NodeId> = unknown.iter().map(|report| report.node).collect();
-    let overrides = descriptions::overrides(global, &ids)?;
+    let overrides = descriptions::overrides_on(master, global, &ids)?;
     let nodes = identify_each(master, &ids, &overrides).or_fail()?;
     let mut journal = FileJournal::of(&open::spec(global)?);
     for (report, node) in unknown.iter_mut().zip(nodes) {

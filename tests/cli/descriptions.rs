@@ -41,6 +41,13 @@ fn an_eds_of_another_device_is_a_warning_or_an_error() {
             "unit 1 pressure mbar",
             "store 1",
             "pdo map 1 1 --transmission sync:2",
+            "lss set-id 1 9",
+            "lss set-bitrate 1 125k",
+            "lss store 1",
+            "lss set-id 71:1:1:10001 9",
+            "config dump 1",
+            "config diff 1 1",
+            "nmt state 1 --probe",
         ] {
             let line = line.replace('\'', "");
             let done = run(&line).exit(2);
@@ -49,7 +56,11 @@ fn an_eds_of_another_device_is_a_warning_or_an_error() {
                 "{line}: {}",
                 done.stderr
             );
-            assert!(done.frames_of("601").iter().all(|data| data.starts_with("40")), "{line}: {:?}", done.frames);
+            // Requests of a read, also of one in segments.
+            let reads = |data: &&str| ["40", "60", "70"].iter().any(|first| data.starts_with(first));
+            assert!(done.frames_of("601").iter().all(reads), "{line}: {:?}", done.frames);
+            let sets = |data: &&str| ["11", "13", "17"].iter().any(|first| data.starts_with(first));
+            assert!(!done.frames_of("7E5").iter().any(sets), "{line}: {:?}", done.frames);
         }
         let done = run("sdo write 1 0x1017 100 --accept-mismatch").exit(0);
         assert_eq!(done.stderr, "");

@@ -28,6 +28,13 @@ pub(super) fn words(failure: &Failure, cause: &LssFailure) -> Words {
 fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
     match &cause.cause {
         LssCause::Service(error) => service(&cause.device, error),
+        LssCause::OtherDescription(device) => {
+            let code =
+                |number: Option<u32>| number.map_or_else(|| "unknown".to_owned(), |number| format!("0x{number:X}"));
+            let (file, vendor, product) = (&device.file, code(device.vendor), code(device.product));
+            Words::new(format!("{file} is for another device: vendor {vendor}, product {product}"))
+                .hint("choose the file of this device, or add --accept-mismatch")
+        }
         LssCause::NoSerialNumber => {
             Words::new("it has no serial number, so it cannot be distinguished from another device")
                 .hint("connect only this device, and use the target \"only\"")

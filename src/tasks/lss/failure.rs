@@ -8,6 +8,7 @@ use super::progress::Progress;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss::{LssAddress, LssRange};
 use crate::canopen::object::ObjectId;
+use crate::device::catalog::MadeFor;
 use crate::master::LssError;
 use crate::tasks::Kind;
 use crate::tasks::failure::lss_kind;
@@ -28,6 +29,8 @@ pub struct LssFailure {
 pub enum LssCause {
     /// An LSS service with the device failed.
     Service(Arc<LssError>),
+    /// The description that the user named is for this device, which is another one.
+    OtherDescription(MadeFor),
     /// The device has no serial number, so it cannot be distinguished from others.
     NoSerialNumber,
     /// More than one device has this node-ID.
@@ -201,6 +204,7 @@ impl LssFailure {
     pub fn kind(&self) -> Kind {
         match &self.cause {
             LssCause::Service(error) => lss_kind(error),
+            LssCause::OtherDescription(_) => Kind::Usage,
             LssCause::NoSerialNumber
             | LssCause::DuplicateNodeId(_)
             | LssCause::OtherNodeIdByLss(_)
