@@ -317,7 +317,7 @@ impl WriteArgs {
                     global.console().note(&message);
                 }
                 bar.finish();
-                let written = text::wire_bytes(&bytes);
+                let written = text::spaced_bytes(&bytes);
                 global.console().detail(&format!("node {}: {at} written: {written}", self.node));
                 let doubts = Note::out_of_range(&node, at, &bytes).into_iter().chain(clipping(master, &node, at));
                 doubts.for_each(|note| notes::print(&global.console(), &note));

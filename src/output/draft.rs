@@ -143,7 +143,7 @@ fn object_entry(draft: &Draft, found: &DraftObject, names: &mut BTreeSet<String>
     }
     match (found.data_type, &found.value) {
         (None, Some(Value::Bytes(bytes))) => {
-            let note = format!("fill in the type of these {} bytes: {}", bytes.len(), super::text::wire_bytes(bytes));
+            let note = format!("fill in the type of these {} bytes: {}", bytes.len(), super::text::spaced_bytes(bytes));
             commented(&note, &lines)
         }
         _ => lines.join("\n"),

@@ -32,11 +32,6 @@ pub enum ValueForm {
     Bytes,
 }
 
-/// The bytes in wire order with blanks between them.
-fn spaced(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<String>>().join(" ")
-}
-
 /// The bytes of a number as a hexadecimal number with all its digits. `None` for more than eight bytes.
 fn hexadecimal(bytes: &[u8]) -> Option<String> {
     let digits: String = bytes.iter().rev().map(|byte| format!("{byte:02X}")).collect();
@@ -62,14 +57,14 @@ impl ObjectValue {
     /// The value as text.
     fn shown(&self) -> String {
         match &self.read.value {
-            _ if self.form == ValueForm::Bytes => spaced(&self.read.raw),
+            _ if self.form == ValueForm::Bytes => text::spaced_bytes(&self.read.raw),
             // Text is shown as bytes, because it is not a number.
-            Value::Text(_) if self.form == ValueForm::Hexadecimal => spaced(&self.read.raw),
+            Value::Text(_) if self.form == ValueForm::Hexadecimal => text::spaced_bytes(&self.read.raw),
             _ if self.form == ValueForm::Hexadecimal => {
-                hexadecimal(&self.read.raw).unwrap_or_else(|| spaced(&self.read.raw))
+                hexadecimal(&self.read.raw).unwrap_or_else(|| text::spaced_bytes(&self.read.raw))
             }
             Value::Text(text) => text::safe(text),
-            Value::Bytes(bytes) => spaced(bytes),
+            Value::Bytes(bytes) => text::spaced_bytes(bytes),
             Value::Unsigned(_) if is_usually_hexadecimal(self.read.object) => {
                 hexadecimal(&self.read.raw).unwrap_or_default()
             }

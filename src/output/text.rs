@@ -94,6 +94,12 @@ pub fn wire_bytes(bytes: &[u8]) -> String {
     bytes.iter().fold("0x".to_owned(), |text, byte| text + &format!("{byte:02X}"))
 }
 
+/// Bytes in wire order for messages: `47 00 00 00`. A number after 0x would look like a value.
+pub fn spaced_bytes(bytes: &[u8]) -> String {
+    let bytes: Vec<String> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+    bytes.join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -82,14 +82,14 @@ fn value_is_written_with_the_width_of_its_type() {
     let done = bench.run("sdo write 5 0x1017=500 0x1800:5=100").prints("");
     assert_eq!(after_identity(&done), ["2B171000F4010000", "2B00180564000000"]);
     let done = bench.run("--verbose sdo write 5 0x1017 1000").prints("");
-    assert_eq!(done.stderr, "node 5: 0x1017:0 written: 0xE803\n");
+    assert_eq!(done.stderr, "node 5: 0x1017:0 written: E8 03\n");
 }
 
 #[test]
 fn acknowledged_value_that_is_not_kept_is_exit_6() {
     // HYDAC: a COB-ID of 0 sets the default.
     let bench = Bench::of("hydac@5");
-    let message = "the write of 0x1800:1 was acknowledged, but its value is 0x85010040 instead of 0x00000000";
+    let message = "the write of 0x1800:1 was acknowledged, but its value is 85 01 00 40 instead of 00 00 00 00";
     bench.run("sdo write 5 0x1800:1 0 --verify").fails(6, &format!("cangauge: node 5: {message}\n"));
 }
 

@@ -51,7 +51,7 @@ const MOST_NAMES: usize = 5;
 /// A value; bytes in wire order.
 pub(super) fn shown(value: &Value) -> String {
     match value {
-        Value::Bytes(bytes) => text::wire_bytes(bytes),
+        Value::Bytes(bytes) => text::spaced_bytes(bytes),
         value => value.to_string(),
     }
 }

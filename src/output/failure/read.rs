@@ -3,7 +3,7 @@
 use super::Words;
 use crate::measure::sample::Status;
 use crate::output::doubt::{type_remedy, unknown_type};
-use crate::output::text::wire_bytes;
+use crate::output::text::spaced_bytes;
 use crate::tasks::Failure;
 use crate::tasks::read::ReadFailure;
 
@@ -38,7 +38,7 @@ pub(super) fn words(failure: &Failure, cause: &ReadFailure) -> Words {
             }
         }
         ReadFailure::TypeUnknown { signal, raw } => {
-            let words = Words::new(format!("{} (received {})", unknown_type(signal), wire_bytes(raw.bytes())));
+            let words = Words::new(format!("{} (received {})", unknown_type(signal), spaced_bytes(raw.bytes())));
             match failure.node {
                 Some(node) => words.hint(type_remedy(node, signal)),
                 None => words,
