@@ -7,8 +7,9 @@ use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use std::collections::BTreeMap;
 
-/// The number of surplus TPDOs that is tolerated if another node sends SYNC, because a SYNC may be lost.
-const FOREIGN_TOLERANCE: u64 = 2;
+/// The number of TPDOs that may arrive in excess if another node sends SYNC. The SYNC before the first TPDO may not have
+/// been received.
+const FOREIGN_TOLERANCE: u64 = 1;
 
 /// A TPDO that arrived without a SYNC for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -177,9 +178,9 @@ mod tests {
 
     #[test]
     fn sync_of_another_node_may_have_been_missed() {
-        assert_eq!(found(false, 1, "SabScd"), [], "two SYNC may be missing");
-        assert_eq!(found(false, 1, "SabSabSab"), [(8, true)]);
-        assert_eq!(found(false, 1, "SaaSaaSaaSaa"), [(8, false)]);
+        assert_eq!(found(false, 1, "SabScSd"), [], "one SYNC may be missing");
+        assert_eq!(found(false, 1, "SabSab"), [(5, true)]);
+        assert_eq!(found(false, 1, "SaaSaaSaa"), [(5, false)]);
         assert_eq!(found(false, 2, "aSSbSScSSdSSe"), []);
     }
 }
