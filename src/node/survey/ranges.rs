@@ -10,25 +10,41 @@ use crate::node::Node;
 use crate::node::read::{Item, read_known, read_optional};
 
 /// Reads the measuring ranges (6148h, 6149h) if a value depends on them. This is an integer that may be too narrow, or
-/// a described signal without a status.
+/// a described signal without a status. A device with integers may have these objects as integers only (7148h to 9149h).
 pub(super) fn read_ranges<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
+    read_family(master, nodes, 0x6000, |_| true)?;
+    for family in [0x9000, 0x8000, 0x7000] {
+        let is_missing =
+            |signal: &Signal| signal.range == MeasuringRange::Unknown && signal.value_object.0.index >= 0x7000;
+        read_family(master, nodes, family, is_missing)?;
+    }
+    Ok(())
+}
+
+/// Reads the measuring ranges of some signals from the objects of a family (6xxxh to 9xxxh).
+fn read_family<A: Ask>(
+    master: &mut A,
+    nodes: &mut [Node],
+    family: u16,
+    is_meant: impl Fn(&Signal) -> bool,
+) -> Result<(), A::Stop> {
     // Node, signal, and its two ends.
     type Range = (usize, usize, [(ObjectId, DataType); 2]);
     let mut wanted: Vec<Range> = Vec::new();
     for (at, node) in nodes.iter().enumerate() {
         for (number, signal) in node.signals.iter().enumerate() {
-            if signal.rules.scaling != Scaling::Digits || !needs_range(node, signal) {
+            if signal.rules.scaling != Scaling::Digits || !is_meant(signal) || !needs_range(node, signal) {
                 continue;
             }
             let entries = node.model.iter().flat_map(|model| &model.description.signals);
             let entry = entries.into_iter().find(|entry| entry.name == signal.name);
             let object = |described: Option<ObjectId>, low: u16| {
-                let of_channel = || signal.has_channel().then(|| ObjectId::new(low, signal.channel));
+                let of_channel = || signal.has_channel().then(|| ObjectId::new(family | low, signal.channel));
                 let object = described.or_else(of_channel)?;
                 Some((object, node.layout().data_type(object)?))
             };
-            let start = object(entry.and_then(|entry| entry.span_start), 0x6148);
-            let end = object(entry.and_then(|entry| entry.span_end), 0x6149);
+            let start = object(entry.and_then(|entry| entry.span_start), 0x148);
+            let end = object(entry.and_then(|entry| entry.span_end), 0x149);
             if let Some((start, end)) = start.zip(end) {
                 wanted.push((at, number, [start, end]));
             }
