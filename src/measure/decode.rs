@@ -218,19 +218,17 @@ impl Decoder {
             let object = field.entry.object;
             let data_type = layout.mapped_type(object, field.entry.bits);
             let mut add = |name: &str, unit: String, reading: &dyn Fn(usize) -> Reading, status: Option<Field>| {
-                let source = self.add_source(Source { node: layout.node, signal: name.into(), unit: unit.into() });
-                values.push(MappedValue { field: *field, reading: reading(source), status });
+                let source = Source { node: layout.node, signal: name.into(), unit: unit.into() };
+                values.push(MappedValue { field: *field, reading: reading(self.add_source(source)), status });
             };
             let is_wanted = |item: &Wanted| wanted.contains(item);
-            if let Some(signal) = layout.signals.iter().find(|signal| signal.is_value(object)) {
+            let signal = layout.value_signal(object);
+            let status_object = signal.or(layout.measured_signal(object)).and_then(|signal| signal.status);
+            let status = fields.iter().find(|other| Some(other.entry.object) == status_object).copied();
+            if let Some(signal) = signal {
                 if wanted.is_empty() || is_wanted(&Wanted::Signal(signal.name.clone())) {
-                    let status = fields.iter().find(|other| Some(other.entry.object) == signal.status).copied();
-                    add(
-                        &signal.name,
-                        unit_text(signal.unit),
-                        &|source| Reading::of_signal(signal, data_type, source),
-                        status,
-                    );
+                    let reading = |source| Reading::of_signal(signal, data_type, source);
+                    add(&signal.name, unit_text(signal.unit), &reading, status);
                 }
             } else if let Some(signal) = layout.signals.iter().find(|signal| signal.status == Some(object)) {
                 if is_wanted(&Wanted::Status(signal.name.clone())) {
@@ -239,7 +237,7 @@ impl Decoder {
                 }
             } else if wanted.is_empty() && !is_dummy(object) {
                 let reading = |source| Reading::of_object(layout, object, data_type, source);
-                add(&layout.name_of(object), unit_text(layout.unit_of(object)), &reading, None);
+                add(&layout.name_of(object), unit_text(layout.unit_of(object)), &reading, status);
             }
             for item in wanted {
                 if let Wanted::Object(wanted, _) | Wanted::Named(_, wanted) = item
@@ -252,8 +250,8 @@ impl Decoder {
                         }
                         None => Reading::of_object(layout, object, data_type, source),
                     };
-                    let unit = if stated.is_none() { layout.unit_of(object) } else { None };
-                    add(&item.name(), unit_text(unit), &reading, None);
+                    let (unit, status) = if stated.is_none() { (layout.unit_of(object), status) } else { (None, None) };
+                    add(&item.name(), unit_text(unit), &reading, status);
                 }
             }
         }

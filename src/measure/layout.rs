@@ -116,7 +116,10 @@ pub const PROCESS_VALUES: [(u16, DataType); 4] = [
 ];
 
 /// Parts of a signal with their own object (`pressure.net`): the name, and the lower three digits of the index.
-pub const PARTS: [(&str, u16); 2] = [("field", 0x100), ("net", 0x140)];
+pub const PARTS: [(&str, u16); 2] = [("field", 0x100), ("net", NET)];
+
+/// The lower three digits of the index of a net value (6140h, 7140h, 8140h, 9140h).
+const NET: u16 = 0x140;
 
 /// The parameters and the mapping of a TPDO.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -205,14 +208,28 @@ impl Layout<'_> {
 
     /// The unit of an object: that of its channel, else the fixed one of the description.
     pub fn unit_of(&self, object: ObjectId) -> Option<Unit> {
-        let signal = self.signal_of(object).filter(|signal| !signal.is_value(object)).and_then(|signal| signal.unit);
         let fixed = || self.model?.description.object(object)?.unit.as_deref().and_then(Unit::from_symbol);
-        signal.or_else(fixed)
+        let of_value = |signal: &&Signal| !signal.is_value(object) || signal.rules.scaling == Scaling::Digits;
+        let signal = self.value_signal(object).or_else(|| self.signal_of(object)).filter(of_value);
+        signal.and_then(|signal| signal.unit).or_else(fixed)
     }
 
     /// The type of a mapped object of `bits` bits. `None` if no source states it, or if the type has another width.
     pub fn mapped_type(&self, object: ObjectId, bits: u8) -> Option<DataType> {
         self.data_type(object).filter(|data_type| fits(*data_type, bits))
+    }
+
+    /// The signal whose process value is in this object, in any of its types.
+    pub fn value_signal(&self, object: ObjectId) -> Option<&Signal> {
+        self.signals.iter().find(|signal| signal.is_value(object))
+    }
+
+    /// The signal for which an object is read by its address: it is the process value or the net value of a channel.
+    /// Values with a fixed factor are shown as sent.
+    pub fn measured_signal(&self, object: ObjectId) -> Option<&Signal> {
+        let is_net = object.index & 0xfff == NET;
+        let signal = self.value_signal(object).or_else(|| self.signal_of(object).filter(|_| is_net))?;
+        (signal.rules.scaling == Scaling::Digits).then_some(signal)
     }
 
     /// The signal of a CiA 404 process value. The object has the unit and decimal digits of this signal.

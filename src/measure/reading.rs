@@ -61,11 +61,15 @@ impl Reading {
         }
     }
 
-    /// The reading of an object by its address, as sent. Other process values of a channel (net value, limits) have the
-    /// decimal digits of the channel.
+    /// The reading of an object by its address. The process value and the net value of a signal are read as the signal.
+    /// Other values of a channel (limits) have the decimal digits of the channel.
     pub fn of_object(layout: Layout<'_>, object: ObjectId, data_type: Option<DataType>, source: usize) -> Reading {
-        let signal = layout.signal_of(object).filter(|signal| !signal.is_value(object));
-        let scaling = signal.map_or(Scaling::Plain, |signal| Scaling::Digits(signal.digits));
+        if let Some(signal) = layout.measured_signal(object) {
+            // The net value is not compared with the measuring range: a tare shifts it.
+            let has_status = signal.status.is_some() || !signal.is_value(object);
+            return Reading { has_status, ..Reading::of_signal(signal, data_type, source) };
+        }
+        let scaling = layout.signal_of(object).map_or(Scaling::Plain, |signal| Scaling::Digits(signal.digits));
         Reading { scaling, ..Reading::plain(data_type, source) }
     }
 

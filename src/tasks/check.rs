@@ -164,7 +164,7 @@ fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<Chec
 }
 
 /// All signals of these nodes, and the objects that the expressions name.
-fn available(nodes: &[Node], expressions: &[Expression]) -> AvailableSignals {
+fn available<'a>(nodes: &'a [Node], expressions: &[Expression]) -> AvailableSignals<'a> {
     let mut available = AvailableSignals::from_layouts(nodes.iter().map(Node::layout));
     for node in nodes {
         for item in expressions.iter().flat_map(Expression::wanted) {

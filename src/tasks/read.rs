@@ -6,6 +6,7 @@ pub use failure::ReadFailure;
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::{FitError, Note};
 use crate::canopen::value::{DataType, Value};
 use crate::device::unit::Unit;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
@@ -86,15 +87,8 @@ pub fn targets(node: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec
                 Wanted::Signal(name) => {
                     let signal = find(node, name)?;
                     let (object, data_type) = signal.value_object;
-                    Target {
-                        source: source(node.id, name, signal.unit),
-                        unit: signal.unit,
-                        object,
-                        status: signal.status,
-                        status_type: status_type(node, signal.status),
-                        overload_register: node.overload_register().filter(|_| !signal.has_status()),
-                        reading: Reading::of_signal(signal, data_type, next_number()),
-                    }
+                    let reading = Reading::of_signal(signal, data_type, next_number());
+                    measured(node, signal, typed(node, object, name, reading))
                 }
                 Wanted::Status(name) => {
                     let no_status = || Failure::at(node.id, ReadFailure::NoStatus { signal: name.clone() });
@@ -116,8 +110,24 @@ pub fn targets(node: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec
 fn plain(node: &Node, object: ObjectId, name: &str, number: usize) -> Target {
     let layout = node.layout();
     let reading = Reading::of_object(layout, object, layout.data_type(object), number);
+    let target = typed(node, object, name, reading);
+    if let Some(signal) = layout.measured_signal(object) {
+        return measured(node, signal, target);
+    }
     let unit = layout.unit_of(object);
-    Target { source: source(node.id, name, unit), unit, ..typed(node, object, name, reading) }
+    Target { source: source(node.id, name, unit), unit, ..target }
+}
+
+/// The target for the process value of a signal, with unit and status.
+fn measured(node: &Node, signal: &Signal, target: Target) -> Target {
+    Target {
+        source: source(node.id, &target.source.signal, signal.unit),
+        unit: signal.unit,
+        status: signal.status,
+        status_type: status_type(node, signal.status),
+        overload_register: node.overload_register().filter(|_| !signal.has_status()),
+        ..target
+    }
 }
 
 fn typed(node: &Node, object: ObjectId, name: &str, reading: Reading) -> Target {
@@ -165,7 +175,12 @@ pub fn sample(
         let sample = target.reading.sample(answer.at, bytes, None).filter(|_| bytes.len() <= 8);
         return sample.ok_or_else(not_a_number);
     };
-    let (number, _) = answer.value(node, target.object, Some(data_type))?;
+    let (number, note) = answer.value(node, target.object, Some(data_type))?;
+    if let Some(Note::Narrower { expected, found }) = note {
+        // A part of a number is not a measured value.
+        let failure = SdoFailure::Fit(FitError::Width { data_type, expected, found });
+        return Err(SdoError { failure, ..not_a_number() });
+    }
     let is_overload = target.reports_overload(status.as_ref());
     let bits = match status.filter(|_| target.status.is_some()) {
         None | Some(Err(SdoError { failure: SdoFailure::Refused(_), .. })) => None,

@@ -54,7 +54,7 @@ fn one_reading() {
         "cangauge: 2 of 3 checks failed: node 5: pressure < 1.25: 1.25 bar; node 5: pressure >= 1.3 bar: 1.25 bar\n"
     );
     check(&bench, &["5", "0x6130:1 == 1.25 and pressure.status == 0"])
-        .prints("ok    0x6130:1 == 1.25 and pressure.status == 0  0x6130:1 1.25, pressure.status 0\n");
+        .prints("ok    0x6130:1 == 1.25 and pressure.status == 0  0x6130:1 1.25 bar, pressure.status 0\n");
 }
 
 #[test]

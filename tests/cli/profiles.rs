@@ -202,3 +202,58 @@ fn integer_with_unknown_or_impossible_digits_passes_no_check() {
         }
     }
 }
+
+/// A process value and a net value are the same by address as by name: unit, digits, status, range.
+#[test]
+fn values_by_address_are_read_as_the_signal() {
+    let unit_and_digits = [("0x6131:1", "u32", "ro", "0x004E0000"), ("0x6132:1", "u8", "ro", "3")];
+    let range = [("0x6148:1", "r32", "ro", "0"), ("0x6149:1", "r32", "ro", "100")];
+    let bench_of = |objects: &[(&str, &str, &str, &str)], mapping: &[&str]| {
+        let all: Vec<_> = objects.iter().chain(&unit_and_digits).chain(&range).copied().collect();
+        bench(&device("0x00020194", &all, mapping))
+    };
+    let scaled = bench_of(&[("0x9130:1", "i32", "ro", "1307")], &["0x91300120"]);
+    assert_eq!(values(scaled.run("read 5 0x9130:1 ch1")), ["5 0x9130:1 1.307 bar", "5 ch1 1.307 bar"]);
+    check(&scaled, "5", "0x9130:1 > 40").exit(1);
+    check(&scaled, "5", "0x9130:1 < 2 bar").exit(0);
+    let log = scaled.run("log 5 0x9130:1 --poll 100ms --count 1").exit(0);
+    assert_eq!(rows(&log.stdout, 1), ["0x9130:1,1.307,bar,"]);
+    // The number as sent: with its type.
+    scaled.run("read 5 0x9130:1/i32").prints("1307\n");
+    // An integer where CiA 404 has a REAL32.
+    let integer = bench_of(&[("0x6130:1", "i32", "ro", "12345")], &["0x61300120"]);
+    check(&integer, "5", "0x6130:1 < 1").exit(1);
+    // The status object says that the value is not valid.
+    let invalid = bench_of(
+        &[("0x6130:1", "r32", "ro", "7.5"), ("0x6140:1", "r32", "ro", "7.5"), ("0x6150:1", "u8", "ro", "1")],
+        &["0x61300120", "0x61500108"],
+    );
+    for signal in ["0x6130:1", "0x6140:1", "ch1.net"] {
+        check(&invalid, "5", &format!("{signal} < 100")).exit(1);
+    }
+    // An integer at the end of its type.
+    let clipped = bench_of(&[("0x7130:1", "i16", "ro", "32767"), ("0x7140:1", "i16", "ro", "32767")], &["0x71300110"]);
+    for signal in ["0x7130:1", "0x7140:1", "ch1.net"] {
+        check(&clipped, "5", &format!("{signal} < 90 bar")).exit(1);
+    }
+}
+
+/// A device with integers only may have its range in another integer family than the value.
+#[test]
+fn range_in_an_integer_family_shows_a_clipped_value() {
+    for (low, high, data_type, end, row) in [
+        ("0x9148:1", "0x9149:1", "i32", "10000000", "ch1,,bar,clipped"),
+        ("0x9148:1", "0x9149:1", "i32", "8000000", "ch1,83.88607,bar,"),
+        ("0x8148:1", "0x8149:1", "i24", "8000000", "ch1,83.88607,bar,"),
+    ] {
+        let objects = [
+            ("0x8130:1", "i24", "ro", "8388607"),
+            ("0x6131:1", "u32", "ro", "0x004E0000"),
+            ("0x6132:1", "u8", "ro", "5"),
+            (low, data_type, "ro", "0"),
+            (high, data_type, "ro", end),
+        ];
+        let log = bench(&device("0x00020194", &objects, &["0x81300118"])).run("log 5 --sync 100ms --count 1").exit(0);
+        assert_eq!(rows(&log.stdout, 1), [row]);
+    }
+}

@@ -32,20 +32,20 @@ pub struct AvailableSignal {
 
 /// The signals that expressions can use.
 #[derive(Clone, Debug, Default)]
-pub struct AvailableSignals {
+pub struct AvailableSignals<'a> {
     signals: Vec<AvailableSignal>,
     /// Nodes whose objects can all be read by address.
-    readable: Vec<NodeId>,
+    readable: Vec<Layout<'a>>,
     /// The names of objects, in lower case, with the name as in [`Source`].
     objects: BTreeMap<(NodeId, String), AvailableSignal>,
 }
 
-impl AvailableSignals {
+impl<'a> AvailableSignals<'a> {
     /// All signals of these nodes, and all objects by address.
-    pub fn from_layouts<'a>(layouts: impl IntoIterator<Item = Layout<'a>>) -> AvailableSignals {
+    pub fn from_layouts(layouts: impl IntoIterator<Item = Layout<'a>>) -> AvailableSignals<'a> {
         let mut available = AvailableSignals::default();
         for layout in layouts {
-            available.readable.push(layout.node);
+            available.readable.push(layout);
             available.add_objects(layout);
             for signal in layout.signals {
                 let node = layout.node;
@@ -84,7 +84,7 @@ impl AvailableSignals {
     }
 
     /// The signals of a recording.
-    pub fn from_sources(sources: &[Source]) -> AvailableSignals {
+    pub fn from_sources(sources: &[Source]) -> AvailableSignals<'a> {
         let entry = |source: &Source| AvailableSignal {
             node: source.node,
             name: source.signal.to_string(),
@@ -95,7 +95,7 @@ impl AvailableSignals {
 
     /// The nodes with at least one signal, without repetitions.
     pub fn nodes(&self) -> Vec<NodeId> {
-        let mut nodes = self.readable.clone();
+        let mut nodes: Vec<NodeId> = self.readable.iter().map(|layout| layout.node).collect();
         nodes.extend(self.signals.iter().map(|signal| signal.node));
         nodes.sort_unstable();
         nodes.dedup();
@@ -106,12 +106,16 @@ impl AvailableSignals {
     fn find(&self, node: NodeId, signal: &SignalName) -> Option<AvailableSignal> {
         let name = signal.name();
         let known = self.signals.iter().find(|known| known.node == node && known.name == name).cloned();
-        let is_readable = matches!(signal.what, Wanted::Object(..)) && self.readable.contains(&node);
         let object = || {
             let names = [name.to_lowercase()].into_iter().chain(spellings(&name));
             names.into_iter().find_map(|name| self.objects.get(&(node, name)).cloned())
         };
-        let address = || is_readable.then(|| AvailableSignal { node, name: name.clone(), unit: None });
+        let address = || {
+            let layout = self.readable.iter().find(|layout| layout.node == node)?;
+            let Wanted::Object(object, stated) = signal.what else { return None };
+            let unit = if stated.is_none() { layout.unit_of(object) } else { None };
+            Some(AvailableSignal { node, name: name.clone(), unit })
+        };
         known.or_else(object).or_else(address)
     }
 
@@ -220,7 +224,11 @@ impl Expression {
     ///
     /// # Errors
     /// A signal that does not exist, or units that cannot be compared.
-    pub fn bind(&self, node: Option<NodeId>, available: &AvailableSignals) -> Result<BoundExpression, ExpressionError> {
+    pub fn bind(
+        &self,
+        node: Option<NodeId>,
+        available: &AvailableSignals<'_>,
+    ) -> Result<BoundExpression, ExpressionError> {
         let node = node.filter(|_| self.applies_to_each_node());
         let mut binder = Binder {
             available,
@@ -248,7 +256,7 @@ impl Expression {
 }
 
 struct Binder<'a> {
-    available: &'a AvailableSignals,
+    available: &'a AvailableSignals<'a>,
     node: Option<NodeId>,
     bound: BoundExpression,
 }

@@ -68,7 +68,7 @@ impl Evaluator {
     pub fn bind(
         &mut self,
         nodes: &[NodeId],
-        available: &AvailableSignals,
+        available: &AvailableSignals<'_>,
         skip_unsupported: bool,
         missing: &[MissingData],
     ) -> Result<(), ExpressionError> {
