@@ -7,18 +7,18 @@
 //! namespace of the interface and needs no directory. It is released when the process ends. Other programs are not
 //! affected. Claims exist only on Linux.
 
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", not(without_socketcan)))]
 mod holder;
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", not(without_socketcan)))]
 mod linux;
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(all(test, target_os = "linux", not(without_socketcan)))]
 mod tests;
 
 use crate::canopen::id::NodeId;
 use std::fmt;
 use std::time::Duration;
 
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", not(without_socketcan)))]
 pub use linux::Claims;
 
 /// The part of the bus that no other process may use while a command runs.
@@ -109,11 +109,11 @@ pub enum ClaimError {
 }
 
 /// Claims on systems other than Linux: always granted.
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(all(target_os = "linux", not(without_socketcan))))]
 #[derive(Debug, Default)]
 pub struct Claims;
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(all(target_os = "linux", not(without_socketcan))))]
 impl Claims {
     /// Claims nothing.
     ///

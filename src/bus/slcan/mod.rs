@@ -266,7 +266,10 @@ impl Slcan {
                         let own = self.clock.continued(time, now.mono);
                         self.own_clock.place(own, now)
                     }
-                    None => now,
+                    None => {
+                        self.own_clock.pass(now);
+                        now
+                    }
                 };
                 if self.is_open() && self.channel.is_some() {
                     out.events.push_back(Event::Frame(Received { frame, at }));
