@@ -222,7 +222,7 @@ fn wrong_requests_are_rejected_before_the_first_write() {
     refuses("pdo map 1 1 pressure/65", "\"pressure/65\": \"65\" is not a number of bits (1 to 64)");
     refuses(
         "pdo map 1 1 6130:300",
-        "\"6130:300\" is neither an object (0x1018:1) nor a name (vendor-id, ai-input-pv:1)",
+        "\"6130:300\" is neither a signal (pressure, ch1, pressure.status) nor an object (0x6130:1, 0x9130:1/32)",
     );
     refuses("pdo map 1 513 pressure", "\"513\" is not the number of a TPDO (1 to 512)");
     for wrong in ["sync:0", "sync:241", "256", "sync", "timers"] {
