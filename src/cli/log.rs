@@ -72,6 +72,9 @@ pub(crate) struct Log {
     /// Send nothing at all
     #[arg(long)]
     pub(super) passive: bool,
+    /// Start every node, also drives and inputs or outputs [default: sensors]
+    #[arg(long, conflicts_with_all = ["no_nmt", "passive", "poll"])]
+    start: bool,
     /// Do not change the NMT state of the nodes
     #[arg(long)]
     no_nmt: bool,
@@ -191,6 +194,7 @@ impl Log {
             // In layout wide, --count counts cycles and not values.
             count: self.count.filter(|_| !self.files.is_wide()),
             nmt: !self.no_nmt,
+            start_all: self.start,
             max_gap: self.max_gap.map(|longest| longest.0),
         })
     }

@@ -229,6 +229,7 @@ fn check_recording(
         duration,
         count: None,
         nmt: true,
+        start_all: false,
         max_gap: None,
         overrides: options.overrides.clone(),
     };

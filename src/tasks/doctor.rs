@@ -262,6 +262,7 @@ fn record(
         duration: Some(OBSERVATION),
         count: None,
         nmt: false,
+        start_all: false,
         max_gap: None,
         overrides: options.overrides.clone(),
     };

@@ -60,6 +60,8 @@ pub struct LogOptions {
     pub count: Option<u64>,
     /// Whether nodes may be started.
     pub nmt: bool,
+    /// Whether devices that are not sensors (profiles 401, 402 and others) are started too.
+    pub start_all: bool,
     /// Longer intervals are gaps; `None` for three usual intervals.
     pub max_gap: Option<Duration>,
     /// Descriptions chosen by the user.
@@ -276,7 +278,7 @@ pub fn log(
         recording.ask_silent_nodes(master);
     }
     let restored = recording.states.restore(master);
-    recording.remarks.extend(recording.states.remark());
+    recording.remarks.extend(recording.states.remarks());
     if let Err(error) = restored {
         recording.remarks.push(Remark::StatesNotRestored(Box::new(error)));
     }

@@ -383,6 +383,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
                 duration: Some(Duration::from_millis(*duration_ms)),
                 count: *count,
                 nmt: *nmt,
+                start_all: true,
                 max_gap: None,
                 overrides: none.clone(),
             };

@@ -98,6 +98,7 @@ fn garbage_changes_no_row_and_ends_no_recording() {
             duration: Some(Duration::from_secs(4)),
             count: None,
             nmt: true,
+            start_all: true,
             max_gap: None,
             overrides: BTreeMap::new(),
         };

@@ -132,6 +132,7 @@ fn plan(mode: Mode) -> LogOptions {
         duration: Some(Duration::from_secs(SECONDS)),
         count: None,
         nmt: true,
+        start_all: true,
         max_gap: None,
         overrides: BTreeMap::new(),
     }

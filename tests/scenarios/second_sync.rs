@@ -51,6 +51,7 @@ fn record(mode: Mode) -> (MemoryBus, Kept, Result<u64, Failure>) {
         duration: Some(Duration::from_secs(1)),
         count: None,
         nmt: true,
+        start_all: true,
         max_gap: None,
         overrides: BTreeMap::new(),
     };

@@ -108,6 +108,7 @@ impl Case {
             duration: Some(Duration::from_secs(self.seconds.unwrap_or(3600))),
             count: None,
             nmt: !self.no_nmt,
+            start_all: true,
             max_gap: None,
             overrides: BTreeMap::new(),
         };
@@ -376,6 +377,7 @@ fn short_recording_says_nothing_of_single_signals() {
         duration: None,
         count: Some(5),
         nmt: true,
+        start_all: true,
         max_gap: None,
         overrides: BTreeMap::new(),
     };

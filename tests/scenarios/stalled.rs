@@ -95,6 +95,7 @@ fn plan(mode: Mode, duration: Duration) -> LogOptions {
         duration: Some(duration),
         count: None,
         nmt: true,
+        start_all: true,
         max_gap: None,
         overrides: BTreeMap::new(),
     }

@@ -31,6 +31,8 @@ pub enum Remark {
     NotReadAgain(NodeId),
     /// These nodes were started. Their previous state is unknown, so they stay operational.
     LeftOperational(Vec<NodeId>),
+    /// These nodes are not sensors, and were not started.
+    NotStarted(Vec<NodeId>),
     /// The node was operational, but its last heartbeat shows another state.
     NotOperational(NodeId, Box<Silence>),
     /// The previous NMT states of the nodes were not restored.

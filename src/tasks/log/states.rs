@@ -3,6 +3,7 @@
 use super::{LogOptions, Mode, Remark};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtCommand, NmtState, booted};
+use crate::device::profiles;
 use crate::master::{Error, Happening, Master};
 use crate::node::Node;
 use crate::node::wait::{Policy, wait};
@@ -11,6 +12,9 @@ use crate::tasks::nmt::NmtFailure;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
+
+/// The profiles of sensors.
+const SENSOR_PROFILES: [u32; 3] = [profiles::MEASURING, profiles::ENCODER, profiles::INCLINOMETER];
 
 /// If the heartbeat is slower, the state of a node is unknown.
 const MAX_HEARTBEAT_PERIOD: Duration = Duration::from_secs(2);
@@ -25,6 +29,8 @@ const CONFIRMATION_TIMEOUT: Duration = Duration::from_millis(500);
 #[derive(Debug, Default)]
 pub(super) struct NmtStates {
     started: BTreeMap<NodeId, Option<NmtState>>,
+    /// The nodes that are not sensors, and were not started.
+    not_started: Vec<NodeId>,
 }
 
 impl NmtStates {
@@ -42,7 +48,12 @@ impl NmtStates {
         let known = heartbeats(master, nodes, restarted)?;
         for node in nodes {
             let before = known.get(&node.id).copied();
-            if before != Some(NmtState::Operational) {
+            if before == Some(NmtState::Operational) {
+                continue;
+            }
+            if !options.start_all && !is_sensor(node) {
+                self.not_started.push(node.id);
+            } else {
                 self.started.insert(node.id, before);
                 master.send(NmtCommand::Start.frame(Some(node.id)));
             }
@@ -111,12 +122,24 @@ impl NmtStates {
         }
     }
 
-    /// The started nodes that stay operational because their previous state is unknown.
-    pub(super) fn remark(&self) -> Option<Remark> {
+    /// The started nodes that stay operational because their previous state is unknown, and the nodes that were not
+    /// started.
+    pub(super) fn remarks(&self) -> impl Iterator<Item = Remark> + use<> {
         let unknown: Vec<NodeId> =
             self.started.iter().filter(|(_, before)| before.is_none()).map(|(&node, _)| node).collect();
-        (!unknown.is_empty()).then_some(Remark::LeftOperational(unknown))
+        let not_started = self.not_started.clone();
+        [Remark::LeftOperational(unknown), Remark::NotStarted(not_started)].into_iter().filter(
+            |remark| !matches!(remark, Remark::LeftOperational(nodes) | Remark::NotStarted(nodes) if nodes.is_empty()),
+        )
     }
+}
+
+/// Whether a recording starts the node: a device of a description, or of a profile of sensors. Others, such as drives,
+/// may move something. A device without profile is treated as a sensor.
+fn is_sensor(node: &Node) -> bool {
+    let is_described = node.model.as_ref().is_some_and(|model| !model.description.signals.is_empty());
+    let profile = node.identity.profile().filter(|&profile| profile != 0);
+    is_described || profile.is_none_or(|profile| SENSOR_PROFILES.contains(&profile))
 }
 
 /// The states from heartbeats. Waits as long as the slowest heartbeat needs.
