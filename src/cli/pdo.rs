@@ -6,6 +6,7 @@ use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::pdo::TpdoNumber;
+use crate::output::console::Console;
 use crate::output::events::remark_text;
 use crate::output::failure::ErrorMessage;
 use crate::output::pdo::ReceivedTpdo;
@@ -236,10 +237,8 @@ impl WatchArgs {
                     WatchEvent::Repeated(node, number) => {
                         console.warn(&remark_text(&Remark::RepeatedTpdo(node, number)));
                     }
-                    WatchEvent::WrongLength { node, number, length, .. } => {
-                        console.warn(&format!(
-                            "node {node}: {number} has {length} bytes, which is not the length of its mapping"
-                        ));
+                    WatchEvent::WrongLength { .. } | WatchEvent::WrongLengths(..) => {
+                        print_wrong_length(&console, event);
                     }
                     WatchEvent::Tpdo { at, node, number, samples, sources } => {
                         let tpdo = ReceivedTpdo::new(at, node, number, samples, sources);
@@ -264,5 +263,23 @@ impl WatchArgs {
                 Ok(several(node_failures.len(), node_failures)?)
             }
         }
+    }
+}
+
+/// Prints how a TPDO of a wrong length is shown, and how many there were.
+fn print_wrong_length(console: &Console, event: &WatchEvent<'_>) {
+    match *event {
+        WatchEvent::WrongLength { node, number, mapped, length, is_used } => {
+            let use_of_it = match is_used {
+                true => format!("its first {mapped} bytes are shown"),
+                false => format!("it is not shown; read by SDO instead: cangauge log {node} --poll 100ms"),
+            };
+            console.warn(&format!("node {node}: {number} has {length} bytes, its mapping {mapped}: {use_of_it}"));
+        }
+        WatchEvent::WrongLengths(node, 1) => console.note(&format!("node {node}: 1 TPDO of the wrong length")),
+        WatchEvent::WrongLengths(node, count) => {
+            console.note(&format!("node {node}: {count} TPDOs of the wrong length"));
+        }
+        _ => {}
     }
 }

@@ -6,7 +6,7 @@ use super::sample::{Sample, Source};
 use crate::bus::Received;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
-use crate::canopen::pdo::{Field, lay_out};
+use crate::canopen::pdo::{Field, TpdoNumber, lay_out};
 use crate::canopen::value::DataType;
 use crate::device::unit::Unit;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -70,6 +70,9 @@ struct MappedValue {
 #[derive(Debug)]
 struct TpdoDecoder {
     node: NodeId,
+    number: TpdoNumber,
+    /// Another TPDO with the same COB-ID, so that the sender or the mapping of a frame is unknown.
+    shared_with: Option<(NodeId, TpdoNumber)>,
     /// Length of the mapping in bytes.
     length: usize,
     values: Vec<MappedValue>,
@@ -87,13 +90,31 @@ struct TpdoDecoder {
     uses_longer: bool,
 }
 
+impl TpdoDecoder {
+    fn new(node: NodeId, number: TpdoNumber, length: usize, values: Vec<MappedValue>) -> TpdoDecoder {
+        TpdoDecoder {
+            node,
+            number,
+            shared_with: None,
+            length,
+            values,
+            is_paused: false,
+            wrong_lengths: 0,
+            other_length: None,
+            has_mapped_length: false,
+            has_mixed_lengths: false,
+            uses_longer: false,
+        }
+    }
+}
+
 /// Decodes the TPDOs of several nodes.
 #[derive(Debug, Default)]
 pub struct Decoder {
     tpdos: HashMap<CanId, TpdoDecoder>,
     sources: Vec<Source>,
-    /// COB-IDs of two nodes that were not reported yet.
-    shared: BTreeMap<CanId, (NodeId, NodeId)>,
+    /// COB-IDs of two TPDOs that were not reported yet.
+    shared: BTreeMap<CanId, [(NodeId, TpdoNumber); 2]>,
     /// Overloads that nodes report by emergencies, each with its channel if it has one.
     overloads: BTreeSet<(NodeId, Option<u8>)>,
 }
@@ -130,11 +151,17 @@ impl Decoder {
         for tpdo in layout.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()) {
             let mut decoder = self.tpdo_decoder(layout, tpdo, wanted);
             let id = tpdo.cob_id.can_id();
-            // Two nodes send with the same COB-ID, so the sender of a frame is unknown.
-            if let Some(other) = self.tpdos.remove(&id).filter(|other| other.node != layout.node) {
-                decoder.is_paused = true;
-                decoder.values.extend(other.values);
-                self.shared.insert(id, (other.node, layout.node));
+            match self.tpdos.remove(&id) {
+                // Nothing is mapped into one of two TPDOs of the node.
+                Some(other) if other.node == layout.node && decoder.length == 0 => decoder = other,
+                Some(other) if other.node == layout.node && other.length == 0 => {}
+                Some(other) => {
+                    decoder.is_paused = true;
+                    decoder.shared_with = Some((other.node, other.number));
+                    decoder.values.extend(other.values);
+                    self.shared.insert(id, [(other.node, other.number), (layout.node, tpdo.number)]);
+                }
+                None => {}
             }
             self.tpdos.insert(id, decoder);
         }
@@ -172,8 +199,9 @@ impl Decoder {
 
     /// The first TPDO of a node with a wrong length: its mapped and its received length in bytes.
     pub fn wrong_length(&self, node: NodeId) -> Option<(usize, usize)> {
-        let mut of_node = self.tpdos.values().filter(|tpdo| tpdo.node == node && !tpdo.uses_longer);
-        of_node.find_map(|tpdo| Some((tpdo.length, tpdo.other_length?)))
+        let of_node = self.tpdos.iter().filter(|(_, tpdo)| tpdo.node == node && !tpdo.uses_longer);
+        let lengths = of_node.filter_map(|(id, tpdo)| Some((id, (tpdo.length, tpdo.other_length?))));
+        lengths.min_by_key(|&(id, _)| id).map(|(_, lengths)| lengths)
     }
 
     /// Removes the TPDOs of a node.
@@ -255,17 +283,7 @@ impl Decoder {
                 }
             }
         }
-        TpdoDecoder {
-            node: layout.node,
-            length: bits.div_ceil(8),
-            values,
-            is_paused: false,
-            wrong_lengths: 0,
-            other_length: None,
-            has_mixed_lengths: false,
-            has_mapped_length: false,
-            uses_longer: false,
-        }
+        TpdoDecoder::new(layout.node, tpdo.number, bits.div_ceil(8), values)
     }
 
     /// Every source, in the order of their numbers.
@@ -273,9 +291,26 @@ impl Decoder {
         &self.sources
     }
 
-    /// COB-IDs with which two nodes send TPDOs, each returned once. These TPDOs are ignored.
-    pub fn take_shared_cob_ids(&mut self) -> BTreeMap<CanId, (NodeId, NodeId)> {
+    /// COB-IDs of two TPDOs, of one node or of two nodes, each returned once. These TPDOs are ignored.
+    pub fn take_shared_cob_ids(&mut self) -> BTreeMap<CanId, [(NodeId, TpdoNumber); 2]> {
         std::mem::take(&mut self.shared)
+    }
+
+    /// The two TPDOs with this COB-ID, if there are two.
+    pub fn shared_cob_id(&self, id: CanId) -> Option<[(NodeId, TpdoNumber); 2]> {
+        let tpdo = self.tpdos.get(&id)?;
+        Some([tpdo.shared_with?, (tpdo.node, tpdo.number)])
+    }
+
+    /// All COB-IDs of two TPDOs of one node.
+    pub fn shared_cob_ids(&self) -> impl Iterator<Item = (CanId, [(NodeId, TpdoNumber); 2])> + '_ {
+        let shared = self.tpdos.keys().filter_map(|&id| Some((id, self.shared_cob_id(id)?)));
+        shared.filter(|(_, [(one, _), (other, _)])| one == other)
+    }
+
+    /// The length in bytes of the mapping of the TPDO with this COB-ID, and its node.
+    pub fn mapped_length(&self, id: CanId) -> Option<(NodeId, usize)> {
+        self.tpdos.get(&id).map(|tpdo| (tpdo.node, tpdo.length))
     }
 
     /// The COB-IDs of the decoded TPDOs.
@@ -306,6 +341,10 @@ impl Decoder {
         let Some(tpdo) = self.tpdos.get_mut(&frame.id()).filter(|_| !frame.is_remote()) else {
             return Decoded::OtherFrame;
         };
+        if tpdo.length == 0 {
+            // Its mapping could not be read, or it is a multiplexed PDO.
+            return Decoded::OtherFrame;
+        }
         if tpdo.is_paused {
             return Decoded::Paused(tpdo.node);
         }

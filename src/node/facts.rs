@@ -3,6 +3,7 @@
 use super::Overrides;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
+use crate::canopen::pdo::TpdoNumber;
 use crate::canopen::value::DataType;
 use crate::device::catalog::{Model, Traits};
 use crate::device::unit::Unit;
@@ -64,6 +65,8 @@ pub struct Node {
     pub signals: Vec<Signal>,
     /// The TPDOs.
     pub tpdos: Vec<Tpdo>,
+    /// Valid TPDOs without a known mapping, each with 1Axxh:0 if it was read: FEh and FFh mean multiplexed PDOs.
+    pub not_decoded: Vec<(TpdoNumber, Option<u8>)>,
     /// The producer heartbeat time (1017h) in milliseconds: 0 if the node sends no heartbeat, `None` if unknown.
     pub heartbeat_ms: Option<u16>,
     /// The CAN-ID of its emergencies (1014h, else 080h + node-ID).
@@ -86,6 +89,7 @@ impl Node {
             is_identified: false,
             signals: Vec::new(),
             tpdos: Vec::new(),
+            not_decoded: Vec::new(),
             heartbeat_ms: None,
             emergency: CanId::emergency(id),
             has_overload: false,

@@ -37,6 +37,8 @@ pub enum Proof {
     BootUp,
     /// The answer to node guarding.
     Guarding,
+    /// The NMT command of another master. The state is not confirmed.
+    Command,
     /// An SDO request that is no longer answered.
     Sdo,
     /// No evidence.
@@ -50,6 +52,7 @@ impl Proof {
             Proof::Heartbeat => "heartbeat",
             Proof::BootUp => "boot-up",
             Proof::Guarding => "guarding",
+            Proof::Command => "command",
             Proof::Sdo => "sdo",
             Proof::None => "none",
         }

@@ -268,6 +268,10 @@ fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
             .map(|_| words.next().flatten())
             .map(|word| unsigned(word.as_ref()).map(MappingEntry::from_word))
             .collect();
+        let code: Option<u8> = unsigned(values[2].as_ref());
+        if cob_id.is_valid() && (mapping.is_none() || code.is_none_or(|code| code > 64)) {
+            nodes[at].not_decoded.push((number, code));
+        }
         nodes[at].tpdos.push(Tpdo {
             number,
             cob_id,

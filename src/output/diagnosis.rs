@@ -20,7 +20,11 @@ pub fn reason(silence: &Silence) -> String {
                 (true, _) => " after the start",
                 (false, _) => "",
             };
-            let by = if *by == Proof::Heartbeat { "" } else { " (node guarding)" };
+            let by = match by {
+                Proof::Heartbeat => "",
+                Proof::Command => " (NMT command)",
+                _ => " (node guarding)",
+            };
             format!("it is {state}{again}{by}")
         }
         SilenceCause::Restarted => "it restarted, and has sent no heartbeat since".to_owned(),
@@ -31,12 +35,11 @@ pub fn reason(silence: &Silence) -> String {
             "it does not answer: it is stopped, or has no power or cable".to_owned()
         }
         SilenceCause::HeartbeatStopped => "its heartbeat stopped".to_owned(),
-        SilenceCause::WrongLength { mapped, received } => {
-            format!("its TPDOs have {received} bytes, but their mapping has {mapped}")
-        }
+        SilenceCause::WrongLength { mapped, received } => wrong_length(*mapped, *received),
         SilenceCause::SharedCobId(id, other) => format!("node {other} sends TPDOs with the same COB-ID {id}"),
+        SilenceCause::SameCobId(id, [one, other]) => format!("its {one} and {other} have the same COB-ID {id}"),
         SilenceCause::NoTpdo => "it has no TPDO".to_owned(),
-        SilenceCause::Tpdo(number, cause) => tpdo_reason(*number, *cause, silence.running),
+        SilenceCause::Tpdo(number, cause) => tpdo_reason(*number, *cause, silence),
     };
     match silence.emergency {
         Some(code) => format!("{text}, emergency {code:04X}h"),
@@ -56,7 +59,7 @@ pub fn word(silence: &Silence) -> &'static str {
         SilenceCause::Unreachable { .. } => "unreachable",
         SilenceCause::HeartbeatStopped => "heartbeat-stopped",
         SilenceCause::WrongLength { .. } => "wrong-length",
-        SilenceCause::SharedCobId(..) => "shared-cob-id",
+        SilenceCause::SharedCobId(..) | SilenceCause::SameCobId(..) => "shared-cob-id",
         SilenceCause::NoTpdo => "no-tpdo",
         SilenceCause::Tpdo(_, cause) => match cause {
             TpdoCause::Disabled => "tpdo-disabled",
@@ -64,7 +67,7 @@ pub fn word(silence: &Silence) -> &'static str {
             TpdoCause::NothingMapped(_) => "nothing-mapped",
             TpdoCause::OnlyOnRequest(_) => "only-on-request",
             TpdoCause::WaitsForSync(_) | TpdoCause::TooFewSyncs { .. } => "waits-for-sync",
-            TpdoCause::SyncCounter { .. } | TpdoCause::SyncRejected => "sync-counter",
+            TpdoCause::SyncCounter { .. } | TpdoCause::SyncStart(_) | TpdoCause::SyncRejected => "sync-counter",
             TpdoCause::SteadyAtSync | TpdoCause::SendsOnChange => "steady",
             TpdoCause::NotSentAtSync | TpdoCause::NotSentOnRequest | TpdoCause::Due(_) => "not-sent",
             TpdoCause::SlowEventTimer(_) => "slow-event-timer",
@@ -78,17 +81,14 @@ pub fn word(silence: &Silence) -> &'static str {
 }
 
 /// Why a TPDO is not sent.
-fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String {
+fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, silence: &Silence) -> String {
     let communication = number.communication(0).index;
     let mapping = number.mapping(0).index;
-    let also = or_not_running(running);
+    let also = or_not_running(silence.running);
     match cause {
         TpdoCause::Disabled => format!("its TPDOs are disabled (bit 31 of {communication:04X}h:1)"),
-        TpdoCause::NothingMapped(Some(code @ 0xfe..)) => {
-            format!("{number} is a multiplexed PDO ({mapping:04X}h:0 is {code:02X}h), which cannot be decoded")
-        }
         TpdoCause::NothingMapped(Some(0)) => format!("nothing is mapped to {number} ({mapping:04X}h:0 is 0)"),
-        TpdoCause::NothingMapped(_) => format!("the mapping of {number} could not be read ({mapping:04X}h)"),
+        TpdoCause::NothingMapped(code) => not_decoded(number, code),
         TpdoCause::OnlyOnRequest(code) => {
             format!("{number} is sent on remote request only ({communication:04X}h:2 is {code})")
         }
@@ -102,6 +102,9 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
         TpdoCause::SyncCounter { is_expected: false } => {
             format!("{number} waits for SYNC without a counter (1019h is 0), and SYNC is sent with one{also}")
         }
+        TpdoCause::SyncStart(start) => format!(
+            "{number} starts at the SYNC with counter {start} ({communication:04X}h:6), and no SYNC has it (1019h){also}"
+        ),
         TpdoCause::SyncRejected => format!("{number} waits for SYNC, and the node rejects the length of SYNC"),
         TpdoCause::TooFewSyncs { every, seen } => {
             let every = if every == 1 { "every SYNC".to_owned() } else { format!("every {every}th SYNC") };
@@ -110,8 +113,8 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
         TpdoCause::SteadyAtSync => format!(
             "{number} is sent at a SYNC only after a change ({communication:04X}h:2 is 0): its value is steady{also}"
         ),
-        TpdoCause::NotSentOnRequest => not_sent(number, "on each remote request", running),
-        TpdoCause::NotSentAtSync => not_sent(number, "at SYNC, and SYNC was sent", running),
+        TpdoCause::NotSentOnRequest => not_sent(number, "on each remote request", silence),
+        TpdoCause::NotSentAtSync => not_sent(number, "at SYNC, and SYNC was sent", silence),
         TpdoCause::SlowEventTimer(timer) => {
             format!("the event timer of {number} is longer ({communication:04X}h:5 is {timer} ms)")
         }
@@ -131,21 +134,45 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
                 "{number} has no event timer ({communication:04X}h:2 and :5), and its value does not change enough{also}"
             )
         }
-        TpdoCause::Due(timer) => not_sent(number, &format!("every {timer} ms ({communication:04X}h:5)"), running),
+        TpdoCause::Due(timer) => not_sent(number, &format!("every {timer} ms ({communication:04X}h:5)"), silence),
         TpdoCause::UnknownType => {
             format!("the transmission type of {number} cannot be read ({communication:04X}h:2){also}")
         }
     }
 }
 
+/// The length of TPDOs differs from their mapping.
+pub fn wrong_length(mapped: usize, received: usize) -> String {
+    format!("its TPDOs have {received} bytes, but their mapping has {mapped}")
+}
+
+/// Why a TPDO cannot be decoded. `code` is 1Axxh:0, if it was read.
+pub fn not_decoded(number: TpdoNumber, code: Option<u8>) -> String {
+    let mapping = number.mapping(0).index;
+    match code {
+        Some(code @ 0xfe..) => {
+            format!("{number} is a multiplexed PDO ({mapping:04X}h:0 is {code:02X}h), which cannot be decoded")
+        }
+        _ => format!("the mapping of {number} could not be read ({mapping:04X}h)"),
+    }
+}
+
 /// The text for a TPDO that is due but was not received.
-fn not_sent(number: TpdoNumber, when: &str, running: Running) -> String {
-    let state = match running {
-        Running::Operational => "the node is operational",
-        Running::NotStopped => "the node answers SDO, and is probably not operational",
-        Running::Unknown => "the node is not operational, or has no power or cable",
+fn not_sent(number: TpdoNumber, when: &str, silence: &Silence) -> String {
+    let unknown: Vec<String> = silence.unknown_cob_ids.iter().take(MAX_LISTED).map(CanId::to_string).collect();
+    let state = match (silence.running, unknown.is_empty()) {
+        (Running::Operational, true) => "the node is operational",
+        (Running::NotStopped, true) => "the node answers SDO, and is probably not operational",
+        (Running::Unknown, true) => "the node is not operational, or has no power or cable",
+        (Running::Operational, false) => "the node is operational, and may send with another COB-ID",
+        (Running::NotStopped, false) => "the node is not operational, or sends with another COB-ID",
+        (Running::Unknown, false) => "the node is not operational, sends with another COB-ID, or has no power or cable",
     };
-    format!("{number} is due {when}, and no {number} was received: {state}")
+    let heard = match unknown.is_empty() {
+        true => String::new(),
+        false => format!(", but frames with COB-ID {}, which none of its TPDOs has", unknown.join(", ")),
+    };
+    format!("{number} is due {when}, and no {number} was received{heard}: {state}")
 }
 
 /// Other possible causes, if the state of the node is unknown.
@@ -176,9 +203,14 @@ pub fn hint(silence: &Silence, node: NodeId, log: &str) -> Option<String> {
     match &silence.cause {
         SilenceCause::InterfaceDown => Some("show the interfaces: cangauge bus list".to_owned()),
         SilenceCause::NotReadAgain | SilenceCause::PollFailed(_) | SilenceCause::SharedCobId(..) => None,
+        SilenceCause::SameCobId(_, [_, number]) => {
+            Some(format!("give one of them another COB-ID: cangauge pdo map {node} {} --cob-id 0xCOB-ID", number.get()))
+        }
         SilenceCause::NotOperational { state: NmtState::Stopped, .. } => Some(format!("cangauge nmt preop {node}")),
         // The node left OPERATIONAL by itself, and would leave it again.
-        SilenceCause::NotOperational { was_started, .. } if *was_started || silence.emergency.is_some() => {
+        SilenceCause::NotOperational { was_started, by, .. }
+            if *by != Proof::Command && (*was_started || silence.emergency.is_some()) =>
+        {
             Some(format!("cangauge errors {node}"))
         }
         SilenceCause::NotOperational { .. } | SilenceCause::Restarted => Some(format!("cangauge nmt start {node}")),
@@ -212,6 +244,7 @@ pub fn hint(silence: &Silence, node: NodeId, log: &str) -> Option<String> {
             | TpdoCause::NothingMapped(_)
             | TpdoCause::NotSentOnRequest
             | TpdoCause::SyncCounter { .. }
+            | TpdoCause::SyncStart(_)
             | TpdoCause::TooFewSyncs { .. }
             | TpdoCause::SteadyAtSync
             | TpdoCause::InhibitTime(_)

@@ -128,9 +128,11 @@ fn bus_words(cause: &FindingCause, interface: &str) -> Words {
         FindingCause::NoFrame(time) => {
             let time = format_duration(*time);
             let message = format!(
-                "no frame was received in {time}, and no node answers: no power, no cable, or another bit rate"
+                "no frame was received in {time}, and no node answers: no power, no cable, another bit rate, or stopped"
             );
-            ("no-frame", message, Some(format!("check the power and the cable; {detect}")))
+            let hint =
+                format!("check the power and the cable; if the nodes are stopped: cangauge nmt preop all; {detect}");
+            ("no-frame", message, Some(hint))
         }
         FindingCause::Unconfigured => {
             let message = "no node answers, but a device without a node-ID is on the bus".to_owned();

@@ -106,6 +106,15 @@ impl Rows {
         self.sink.change_columns(Columns::Wide(wide.columns()))
     }
 
+    /// Another device follows: starts the next file, if rows were written to a file.
+    ///
+    /// # Errors
+    /// A row cannot be written.
+    pub fn start_file(&mut self, at: Stamp) -> io::Result<()> {
+        self.put_cycles(at, true)?;
+        self.sink.start_next_file(self.wide.as_ref().map_or(Columns::Long, |wide| Columns::Wide(wide.columns())))
+    }
+
     /// Writes the rows that have waited long enough.
     ///
     /// # Errors

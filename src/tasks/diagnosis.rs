@@ -29,6 +29,15 @@ pub struct Silence {
     pub emergency: Option<u16>,
     /// Whether the node is OPERATIONAL. Reported with uncertain causes, because a node in another state is also silent.
     pub running: Running,
+    /// COB-IDs of frames that may be its TPDOs, although no TPDO of the recorded nodes has them.
+    pub unknown_cob_ids: Vec<CanId>,
+}
+
+impl Silence {
+    /// A cause about which nothing else is known.
+    pub fn of(cause: SilenceCause) -> Silence {
+        Silence { cause, emergency: None, running: Running::Unknown, unknown_cob_ids: Vec::new() }
+    }
 }
 
 /// Whether a node is OPERATIONAL, as far as known. If another state is known, that state is the cause.
@@ -79,6 +88,8 @@ pub enum SilenceCause {
     },
     /// Another node sends TPDOs with the same COB-ID.
     SharedCobId(CanId, NodeId),
+    /// Two TPDOs of the node have the same COB-ID.
+    SameCobId(CanId, [TpdoNumber; 2]),
     /// The node has no TPDO.
     NoTpdo,
     /// The TPDO is not sent.
@@ -101,6 +112,8 @@ pub enum TpdoCause {
         /// Whether the node expects a counter.
         is_expected: bool,
     },
+    /// The TPDO starts at the SYNC with this counter (180xh:6), and SYNC never has this counter (1019h).
+    SyncStart(u8),
     /// The node reports that SYNC has an unexpected length (emergency 8240h).
     SyncRejected,
     /// The TPDO is sent at every n-th SYNC, but fewer SYNC messages were received.
@@ -140,6 +153,8 @@ pub enum TpdoCause {
 pub struct Heard {
     /// The state of its last heartbeat; `None` after a boot-up.
     pub state: Option<NmtState>,
+    /// The state that the NMT command of another master demands, other than OPERATIONAL.
+    pub commanded: Option<NmtState>,
     /// Whether the latest heartbeat or boot-up message was a boot-up message.
     pub booted: bool,
     /// Whether the node was operational before.
@@ -154,8 +169,8 @@ pub struct Heard {
     pub syncs: (u64, usize),
     /// The mapped and the received length in bytes of ignored TPDOs.
     pub wrong_length: Option<(usize, usize)>,
-    /// A COB-ID with which another node also sends TPDOs.
-    pub shared: Option<(CanId, NodeId)>,
+    /// A COB-ID of two TPDOs: of this node and another one, or of this node.
+    pub shared: Option<(CanId, [(NodeId, TpdoNumber); 2])>,
 }
 
 /// The way in which measurements were requested.
@@ -180,8 +195,11 @@ pub fn diagnose(
     situation: &Situation,
 ) -> Silence {
     let heartbeat = heard.state.filter(|_| !heard.heartbeat_stopped).map(|state| (state, Proof::Heartbeat));
-    let known = heartbeat.or_else(|| findings.and_then(|findings| findings.state));
     let answers = findings.map(|findings| findings.answers);
+    // A node that answers is not stopped, and one that does not answer may be.
+    let is_possible = |&state: &NmtState| !heard.sends_tpdos && answers != Some(state == NmtState::Stopped);
+    let commanded = heard.commanded.filter(is_possible).map(|state| (state, Proof::Command));
+    let known = heartbeat.or_else(|| findings.and_then(|findings| findings.state)).or(commanded);
     let is_operational = heard.sends_tpdos || known.is_some_and(|(state, _)| state == NmtState::Operational);
     let running = match answers {
         _ if is_operational => Running::Operational,
@@ -192,21 +210,27 @@ pub fn diagnose(
     let cause = match known {
         Some((state, by)) if state != NmtState::Operational => SilenceCause::NotOperational { state, by, was_started },
         _ if heard.booted && !is_operational => SilenceCause::Restarted,
-        _ if heard.wrong_length.is_some() || heard.shared.is_some() => frames_cause(heard),
+        _ if heard.wrong_length.is_some() || heard.shared.is_some() => frames_cause(node.id, heard),
         _ if answers == Some(false) && !heard.sends_tpdos => {
             SilenceCause::Unreachable { had_heartbeat: heard.heartbeat_stopped }
         }
         _ if heard.heartbeat_stopped && answers.is_none() => SilenceCause::HeartbeatStopped,
         _ => setup_cause(node, carries, heard, findings, situation),
     };
-    Silence { cause, emergency: heard.emergency, running }
+    Silence { emergency: heard.emergency, running, ..Silence::of(cause) }
 }
 
 /// Why the received TPDOs give no values.
-fn frames_cause(heard: &Heard) -> SilenceCause {
-    match (heard.wrong_length, heard.shared) {
-        (Some((mapped, received)), _) => SilenceCause::WrongLength { mapped, received },
-        (None, Some((id, other))) => SilenceCause::SharedCobId(id, other),
+fn frames_cause(node: NodeId, heard: &Heard) -> SilenceCause {
+    match (heard.shared, heard.wrong_length) {
+        (Some((id, [(one, first), (other, second)])), _) if one == other => {
+            SilenceCause::SameCobId(id, [first, second])
+        }
+        (_, Some((mapped, received))) => SilenceCause::WrongLength { mapped, received },
+        (Some((id, senders)), None) => {
+            let other = senders.iter().map(|&(sender, _)| sender).find(|&sender| sender != node);
+            SilenceCause::SharedCobId(id, other.unwrap_or(node))
+        }
         (None, None) => SilenceCause::NoTpdo,
     }
 }
@@ -234,7 +258,11 @@ fn setup_cause(
     let is_due = |cause: &TpdoCause| {
         matches!(
             cause,
-            TpdoCause::Due(_) | TpdoCause::NotSentAtSync | TpdoCause::NotSentOnRequest | TpdoCause::SyncRejected
+            TpdoCause::Due(_)
+                | TpdoCause::NotSentAtSync
+                | TpdoCause::NotSentOnRequest
+                | TpdoCause::SyncRejected
+                | TpdoCause::SyncStart(_)
         )
     };
     let cause = causes.iter().find(|(_, cause)| is_due(cause)).or(causes.first());
@@ -265,7 +293,9 @@ fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situ
         Some(Transmission::Sync(every)) if u64::from(every) > seen => TpdoCause::TooFewSyncs { every, seen },
         Some(Transmission::AcyclicSync) if seen == 0 => TpdoCause::TooFewSyncs { every: 1, seen },
         Some(Transmission::AcyclicSync) => channel_off(node, tpdo, findings).unwrap_or(TpdoCause::SteadyAtSync),
-        Some(Transmission::Sync(_)) => channel_off(node, tpdo, findings).unwrap_or(TpdoCause::NotSentAtSync),
+        Some(Transmission::Sync(_)) => channel_off(node, tpdo, findings)
+            .or_else(|| sync_start(node, tpdo, findings))
+            .unwrap_or(TpdoCause::NotSentAtSync),
         Some(Transmission::Manufacturer | Transmission::Profile | Transmission::Reserved(_)) => {
             event_cause(node, tpdo, findings, situation.waited)
         }
@@ -285,6 +315,12 @@ fn event_cause(node: &Node, tpdo: &Tpdo, findings: &Findings, waited: Duration) 
             .or(inhibit.map(TpdoCause::InhibitTime))
             .unwrap_or(TpdoCause::SendsOnChange),
     }
+}
+
+/// The cause, if a TPDO starts at a SYNC with a counter that SYNC never has.
+fn sync_start(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<TpdoCause> {
+    let start: u8 = findings.unsigned(tpdo.number.communication(6))?;
+    (start > node.sync_overflow.unwrap_or(0)).then_some(TpdoCause::SyncStart(start))
 }
 
 /// The cause, if all channels of a TPDO are off.

@@ -185,7 +185,7 @@ fn only_heartbeat(state: Option<NmtState>) -> FindingCause {
 /// The problem of a node whose heartbeat shows a state other than OPERATIONAL.
 fn not_operational(state: NmtState) -> Silence {
     let cause = SilenceCause::NotOperational { state, by: Proof::Heartbeat, was_started: false };
-    Silence { cause, emergency: None, running: Running::Unknown }
+    Silence::of(cause)
 }
 
 /// Whether a node answered before, and its heartbeat now shows STOPPED.

@@ -33,6 +33,7 @@ use crate::node::Node;
 use crate::node::Overrides;
 use crate::node::survey::{SETUP_TIMEOUT, survey_each};
 use crate::tasks::Failure;
+pub(super) use changes::changes;
 pub use changes::{Change, TpdoChange};
 use checks::{check_wanted, refuse_second_sync, sync_share};
 pub use events::EventCounts;
@@ -188,6 +189,8 @@ pub struct RecordingReport {
     pub failed: Vec<Failure>,
     /// Nodes with a TPDO that two devices send. From then on, these TPDOs were ignored.
     pub two_senders: Vec<Failure>,
+    /// Nodes that were replaced by other devices.
+    pub replaced: Vec<Failure>,
     /// Nodes that sent no samples, or stopped before the end.
     pub lost: Vec<NodeId>,
     /// Why there are no values.
@@ -256,7 +259,7 @@ pub fn log(
     observer.sources(recording.decoder.sources())?;
     recording.report_shared_cob_ids(master.bus().now(), observer);
     if recording.poll.is_none() {
-        recording.report_narrow_values(master.bus().now(), observer);
+        recording.report_setup(master.bus().now(), observer);
     }
     master.listen(&recording.filters())?;
     // Nodes may restart between their survey and the recording.

@@ -184,7 +184,7 @@ fn missing_data_is_no_success() {
     assert_eq!(done.stdout, "none  pressure < 3  no data: node 9: read 0x1000:0: no answer within 500 ms\n");
     assert_eq!(
         done.stderr,
-        "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: check its node-ID, power and cable; find the cause: cangauge doctor 9\n"
+        "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: check its node-ID, power and cable, and that it is not stopped; find the cause: cangauge doctor 9\n"
     );
     // A failed check has priority over missing data.
     check(&bench, &["5,9", "pressure < 3"]).exit(7);

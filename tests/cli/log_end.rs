@@ -59,7 +59,7 @@ fn no_nmt_sends_no_nmt_command() {
 #[test]
 fn node_without_an_answer_is_named_and_the_others_are_recorded() {
     let bench = Bench::of("mh4@1");
-    let no_answer = "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: check its node-ID, power and cable; find the cause: cangauge doctor 9\n";
+    let no_answer = "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: check its node-ID, power and cable, and that it is not stopped; find the cause: cangauge doctor 9\n";
     let done = bench.run("log 9 --sync 10ms -o run.csv").fails(3, no_answer);
     assert_eq!((done.frames_of("000"), bench.files()), (vec![], vec![]), "nothing was started, no file is left");
     let done = bench.run("log 1,9 --sync 10ms --count 4 -o run.csv").exit(7);

@@ -102,7 +102,7 @@ fn absent_node_is_exit_3() {
     let done = bench.run("nmt state 9").exit(3);
     assert_eq!(
         done.stderr,
-        "cangauge: node 9: no heartbeat and no SDO answer\nhint: check its node-ID, power and cable; find the cause: cangauge doctor 9\n"
+        "cangauge: node 9: no heartbeat and no SDO answer\nhint: check its node-ID, power and cable, and that it is not stopped; find the cause: cangauge doctor 9\n"
     );
     let done = bench.run("nmt state 1,9").exit(7);
     assert_eq!(done.stdout, "1  -  none\n9  -  none\n");

@@ -23,7 +23,7 @@ fn overloaded() -> Bench {
     ))
 }
 
-const NO_ANSWER: &str = "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: check its node-ID, power and cable; find the cause: cangauge doctor 9\n";
+const NO_ANSWER: &str = "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: check its node-ID, power and cable, and that it is not stopped; find the cause: cangauge doctor 9\n";
 
 #[test]
 fn one_signal_of_one_node_is_a_bare_number() {
@@ -120,7 +120,7 @@ fn values_of_answering_nodes_are_printed() {
     assert_eq!(
         done.error(),
         json!({"error": {"kind": "no-answer", "exit": 3, "message": "node 9: read 0x1000:0: no answer within 500 ms",
-            "node": 9, "object": "0x1000:0", "abort": null, "hint": "check its node-ID, power and cable; find the cause: cangauge doctor 9"}})
+            "node": 9, "object": "0x1000:0", "abort": null, "hint": "check its node-ID, power and cable, and that it is not stopped; find the cause: cangauge doctor 9"}})
     );
 }
 

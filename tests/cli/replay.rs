@@ -52,6 +52,36 @@ fn second_sender_of_a_tpdo_is_found_in_a_recording() {
 }
 
 #[test]
+fn tpdos_of_a_wrong_length_are_the_reason_for_no_rows() {
+    let bench = Bench::of("mh4@5");
+    for (frame, length) in [("185#0000A03F0000", 6), ("185#0000A0", 3)] {
+        cycles(&bench, &[frame]);
+        let done = replay(&bench, "t.log", "log 5 --device mh4").exit(3);
+        let reason = format!("node 5: its TPDOs have {length} bytes, but their mapping has 5\n");
+        assert!(done.stderr.contains(&reason) && done.stderr.contains("--device 5=FILE"), "{}", done.stderr);
+    }
+}
+
+#[test]
+fn cut_answer_is_no_mapping() {
+    let bench = Bench::of("mh4@5,dps@127");
+    bench.run("log 5,127 --sync 20ms --duration 1s").exit(0);
+    keep(&bench);
+    let trace = fs::read_to_string(bench.path("t.log")).expect("the trace");
+    for answer in ["585#43001A01", "585#43001801"] {
+        let is_cut = |line: &&str| line.contains(answer);
+        assert_eq!(trace.lines().filter(is_cut).count(), 1, "{trace}");
+        let cut = |line: &str| if is_cut(&line) { line[..line.len() - 2].to_owned() } else { line.to_owned() };
+        let lines: String = trace.lines().map(|line| cut(line) + "\n").collect();
+        fs::write(bench.path("cut.log"), lines).expect("written");
+        let done = replay(&bench, "cut.log", "log 5,127").exit(0);
+        assert!(done.stdout.lines().skip(1).all(|line| line.split(',').nth(2) == Some("127")), "{}", done.stdout);
+        let note = "node 5: TPDOs with COB-ID 185 are ignored: their mapping is unknown";
+        assert!(done.stderr.contains(note), "{}", done.stderr);
+    }
+}
+
+#[test]
 fn unusual_heartbeats_are_reported_once() {
     let bench = Bench::of("mh4@1");
     let frames = ["705#0500", "706#05", "708#7F00000000000000", "705#0500", "707#", "707#", "709#R1", "706#7F"];

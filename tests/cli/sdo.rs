@@ -154,7 +154,8 @@ fn rejected_request_is_exit_4() {
 #[test]
 fn absent_node_is_exit_3() {
     let bench = Bench::of("mh4@1");
-    let hint = "hint: check its node-ID, power and cable; find the cause: cangauge doctor 5\n";
+    let hint =
+        "hint: check its node-ID, power and cable, and that it is not stopped; find the cause: cangauge doctor 5\n";
     let done = bench
         .run("sdo read 5 0x6130:1")
         .fails(3, &format!("cangauge: node 5: read 0x6130:1: no answer within 500 ms\n{hint}"));
@@ -167,7 +168,7 @@ fn absent_node_is_exit_3() {
     assert_eq!(
         error,
         json!({"error": {"kind": "no-answer", "exit": 3, "message": "node 5: read 0x6130:1: no answer within 2 s",
-            "node": 5, "object": "0x6130:1", "abort": null, "hint": "check its node-ID, power and cable; find the cause: cangauge doctor 5"}})
+            "node": 5, "object": "0x6130:1", "abort": null, "hint": "check its node-ID, power and cable, and that it is not stopped; find the cause: cangauge doctor 5"}})
     );
 }
 

@@ -10,8 +10,11 @@ use cangauge::measure::decode::Wanted;
 use cangauge::output::events::{event_text, remark_text};
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::Bench;
+use cangauge::tasks::Kind;
 use cangauge::tasks::log::{LogEvent, LogOptions, Mode, RecordingReport, log};
+use cangauge::tasks::pdo::{WatchEvent, watch};
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// A device of CiA 401: two analogue inputs in TPDO1, sent on change, with an inhibit time.
@@ -31,11 +34,14 @@ const OBJECTS: &[(&str, &str, &str, &str, bool)] = &[
     ("0x1001", "error-register", "u8", "0", false),
     ("0x1017", "producer-heartbeat-time", "u16", "0", false),
     ("0x1018:1", "vendor-id", "u32", "9", false),
+    ("0x1018:2", "product-code", "u32", "7", false),
+    ("0x1018:4", "serial-number", "u32", "1", false),
     ("0x1800:0", "tpdo-1-entries", "u8", "5", false),
     ("0x1800:1", "tpdo-1-cob-id", "u32", "0x40000185", false),
     ("0x1800:2", "tpdo-1-transmission", "u8", "255", false),
     ("0x1800:3", "tpdo-1-inhibit", "u16", "0", false),
     ("0x1800:5", "tpdo-1-event-timer", "u16", "0", false),
+    ("0x1800:6", "tpdo-1-sync-start", "u8", "0", false),
     ("0x1A00:0", "tpdo-1-count", "u8", "1", false),
     ("0x1A00:1", "tpdo-1-map-1", "u32", "0x64010110", false),
     ("0x6401:1", "input-1", "i16", "1000", true),
@@ -245,9 +251,19 @@ fn each_cause_has_its_reason() {
         ("channel off", Case::mh4(&format!("{event}, \"0x6112:1\" = 0")), "its channel is off (0x6112:1 is 0)"),
         ("stopped, with heartbeat", Case::mh4(ALIVE).hears(&[(1000, "000#0205")]), "it is stopped after the start"),
         (
-            "stopped, without heartbeat",
+            "stopped by another master, without heartbeat",
             Case::mh4("").hears(&[(1000, "000#0205")]),
-            "it does not answer: it is stopped, or has no power or cable",
+            "it is stopped after the start (NMT command)",
+        ),
+        (
+            "all are set to pre-operational by another master, without heartbeat",
+            Case::mh4("").hears(&[(1000, "000#8000")]),
+            "it is pre-operational again after the start (NMT command)",
+        ),
+        (
+            "stopped by another master, and started again",
+            Case::mh4("").hears(&[(1000, "000#0205"), (1100, "000#0105")]),
+            "TPDO1 waits for SYNC, and no node sends SYNC",
         ),
         (
             "pre-operational again, by guarding",
@@ -285,6 +301,33 @@ fn each_cause_has_its_reason() {
             "TPDO1 is due at SYNC, and SYNC was sent, and no TPDO1 was received: the node answers SDO, and is probably not operational",
         ),
         (
+            "SYNC start value, and SYNC without a counter",
+            Case { no_nmt: true, ..inputs("set = { \"0x1800:2\" = 1, \"0x1800:6\" = 5 }\n").sync(100) },
+            "TPDO1 starts at the SYNC with counter 5 (1800h:6), and no SYNC has it (1019h), or the node is not operational",
+        ),
+        (
+            "another COB-ID than in 1800h:1, at SYNC",
+            Case { no_nmt: true, ..Case::mh4("").sync(100) }
+                .hears(&[(2000, "1C5#0000A03F00"), (2100, "1C5#0000A03F00")]),
+            "no TPDO1 was received, but frames with COB-ID 1C5, which none of its TPDOs has: \
+             the node is not operational, or sends with another COB-ID",
+        ),
+        (
+            "another COB-ID than in 1801h:1, by timer",
+            Case { no_nmt: true, ..Case::mh4(timer) }.hears(&[(2100, "3A5#00"), (2200, "745#05")]),
+            "no TPDO2 was received, but frames with COB-ID 3A5, which",
+        ),
+        (
+            "TPDO of another node with a heartbeat",
+            Case { no_nmt: true, ..Case::mh4("").sync(100) }.hears(&[(1500, "745#05"), (2000, "1C5#0000A03F00")]),
+            "no TPDO1 was received: the node answers SDO, and is probably not operational",
+        ),
+        (
+            "two TPDOs with one COB-ID",
+            Case::mh4("\"0x1801:1\" = 0x40000185").sync(100),
+            "its TPDO1 and TPDO2 have the same COB-ID 185",
+        ),
+        (
             "wrong length",
             Case::mh4("").hears(&[(1000, "185#0102"), (2000, "185#0102")]),
             "its TPDOs have 2 bytes, but their mapping has 5",
@@ -314,8 +357,7 @@ fn each_cause_has_its_reason() {
         ),
         (
             "event timer behind an inhibit time",
-            inputs("set = { \"0x1800:5\" = 100, \"0x1800:3\" = 60000, \"0x1A00:0\" = 1 }\n")
-                .hears(&[(100, "000#8005")]),
+            Case { no_nmt: true, ..inputs("set = { \"0x1800:5\" = 100, \"0x1800:3\" = 60000 }\n") },
             "the inhibit time of TPDO1 is longer (1800h:3 is 6 s)",
         ),
         (
@@ -353,6 +395,88 @@ fn signal_without_values_has_its_reason_after_five_seconds_and_at_the_end() {
     assert_eq!(remarks(&kept), [reason]);
     let at_end: Vec<String> = report.remarks.iter().map(cangauge::output::events::remark_text).collect();
     assert!(at_end.iter().any(|text| text == reason), "{at_end:?}");
+}
+
+#[test]
+fn sync_messages_are_counted_while_they_are_sent() {
+    let case = Case { seconds: Some(7), ..Case::mh4("\"0x1801:2\" = 240").sync(100) };
+    let remarks = remarks(&case.run().1);
+    assert_eq!(remarks.len(), 1, "{remarks:?}");
+    let reason = "node 5: no measurements of temperature: TPDO2 is sent at every 240th SYNC (1801h:2), and 5";
+    assert!(remarks[0].starts_with(reason), "{remarks:?}");
+}
+
+#[test]
+fn multiplexed_tpdo_beside_another_one_is_reported_once() {
+    for (set, text) in [
+        ("\"0x1A01:0\" = 255", "node 5: TPDO2 is a multiplexed PDO (1A01h:0 is FFh), which cannot be decoded"),
+        (
+            "\"0x1A00:0\" = 254, \"0x1801:5\" = 100",
+            "node 5: TPDO1 is a multiplexed PDO (1A00h:0 is FEh), which cannot be decoded",
+        ),
+    ] {
+        let (result, kept) = Case { seconds: Some(7), ..Case::mh4(set).sync(100) }.run();
+        assert!(result.expect("a recording").rows > 0);
+        assert_eq!(remarks(&kept), [text]);
+    }
+}
+
+#[test]
+fn device_that_was_replaced_is_an_event_and_a_failure() {
+    let inputs = "[[device]]\nkind = \"inputs.toml\"\nnode = 5\nset = { \"0x1800:5\" = 100 }\n";
+    for (write, text) in [
+        ("605#2318100402000000", "it is another device: serial 2, before 1"),
+        ("605#2318100263000000", "it is another device"),
+    ] {
+        // The wrong length makes the node read again.
+        let case = Case { seconds: Some(6), ..Case::of(inputs) }.hears(&[(2000, write), (2500, "185#0102030405")]);
+        let (result, kept) = case.run();
+        let report = result.expect("a recording");
+        assert_eq!(report.replaced.len(), 1);
+        assert_eq!(report.replaced[0].kind(), Kind::Unexpected);
+        let events: Vec<_> =
+            kept.notes.iter().map(event_text).filter(|event| event.event == Some("replaced")).collect();
+        assert!(matches!(events.as_slice(), [event] if event.text.ends_with(text)), "{events:?}");
+    }
+}
+
+/// The TPDOs of node 5 that are shown, and the reports of wrong lengths, while another station sends `others`.
+fn watched(set: &str, others: &[(u64, &'static str)]) -> (usize, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bench = format!("clock = \"virtual\"\n{}", Case::mh4(set).bench);
+    let mut bus = Bench::from_toml(&bench, folder.path()).expect("a bench").open().expect("a bus");
+    bus.attach(Other::new(others));
+    let (mut shown, mut reports) = (0, Vec::new());
+    let mut on_event = |event: &WatchEvent<'_>| {
+        match event {
+            WatchEvent::Tpdo { .. } => shown += 1,
+            WatchEvent::WrongLength { number, mapped, length, is_used, .. } => {
+                reports.push(format!("{number} {length} of {mapped}{}", if *is_used { ", used" } else { "" }));
+            }
+            WatchEvent::WrongLengths(_, count) => reports.push(format!("{count} in total")),
+            _ => {}
+        }
+        ControlFlow::Continue(())
+    };
+    let duration = Some(Duration::from_secs(6));
+    let master = &mut Master::new(&mut bus, Timing::default());
+    watch(master, &[node(5)], &BTreeMap::new(), duration, &mut on_event).expect("TPDOs");
+    (shown, reports)
+}
+
+#[test]
+fn watched_tpdo_of_another_length_is_reported_once_and_used_if_it_is_longer() {
+    let longer = "185#0000A03F000000";
+    let frames: Vec<_> = (1..9).map(|step| (step * 500, longer)).collect();
+    let (shown, reports) = watched("", &frames);
+    assert_eq!(reports, ["TPDO1 7 of 5, used", "8 in total"]);
+    assert_eq!(shown, 7, "all but the first one, after which the mapping is read again");
+    let frames: Vec<_> = (1..9).map(|step| (step * 500, "185#0000")).collect();
+    assert_eq!(watched("", &frames), (0, vec!["TPDO1 2 of 5".to_owned(), "8 in total".to_owned()]));
+    // Two producers.
+    let frames: Vec<_> = (1..9).map(|step| (step * 500, ["185#0000A03F00", longer][step as usize % 2])).collect();
+    let (shown, reports) = watched("", &frames);
+    assert_eq!((shown, reports.join("; ").as_str()), (4, "TPDO1 7 of 5, used; TPDO1 7 of 5; 4 in total"));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::output::failure::ErrorMessage;
 use crate::output::progress::Progress;
 use crate::output::rows::{FileChange, Rows};
 use crate::tasks::Failure;
-use crate::tasks::log::{LogEvent, LogFailure, Observer};
+use crate::tasks::log::{Change, LogEvent, LogFailure, Observer};
 use std::io;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -177,6 +177,12 @@ impl Observer for Recorder {
     }
 
     fn event(&mut self, event: &LogEvent, at: Stamp) {
+        if let LogEvent::ReadAgain(_, changes) = event
+            && changes.iter().any(|change| matches!(change, Change::Device(..)))
+            && let Err(error) = self.rows.start_file(at)
+        {
+            self.error.get_or_insert(Unwritten::Rows(error));
+        }
         self.put_event(&event_text(event), at);
     }
 

@@ -154,7 +154,35 @@ fn shared_cob_id_yields_no_samples() {
     let received = Received { frame: "181#0000803F".parse().expect("a frame"), at: Stamp::default() };
     let mut samples = Vec::new();
     assert!(matches!(decoder.decode(&received, &mut samples), Decoded::Paused(_)) && samples.is_empty());
-    assert_eq!(decoder.take_shared_cob_ids().into_values().collect::<Vec<_>>(), [(one.id, other.id)]);
+    let number = |number| TpdoNumber::new(number).expect("a number");
+    let tpdos = [(one.id, number(1)), (other.id, number(1))];
+    assert_eq!(decoder.take_shared_cob_ids().into_values().collect::<Vec<_>>(), [tpdos]);
+    // Two TPDOs of one node, with mappings of the same and of another length.
+    for mapping in [vec![0x7130_0110, 0x6150_0110], vec![0x6130_0120]] {
+        let mut twice = one.clone();
+        let mapping: Vec<MappingEntry> = mapping.into_iter().map(MappingEntry::from_word).collect();
+        twice.tpdos.push(Tpdo { number: number(2), mapping, ..one.tpdos[0].clone() });
+        let mut decoder = Decoder::default();
+        decoder.add(twice.layout(), &[]);
+        assert!(matches!(decoder.decode(&received, &mut samples), Decoded::Paused(_)) && samples.is_empty());
+        assert_eq!(decoder.shared_cob_id(CanId::Standard(0x181)), Some([(one.id, number(1)), (one.id, number(2))]));
+    }
+    // A TPDO without a mapping is no second sender.
+    let mut empty = one.clone();
+    empty.tpdos.insert(0, Tpdo { number: number(2), mapping: Vec::new(), ..one.tpdos[0].clone() });
+    let mut decoder = Decoder::default();
+    decoder.add(empty.layout(), &[]);
+    assert_eq!((decoder.decode(&received, &mut samples), samples.len()), (Decoded::Tpdo(one.id), 1));
+}
+
+#[test]
+fn tpdo_without_a_mapping_has_no_wrong_length() {
+    let multiplexed = node(REAL, &[], |_| {});
+    let mut decoder = Decoder::default();
+    decoder.add(multiplexed.layout(), &[]);
+    let received = Received { frame: "181#8530610100000000".parse().expect("a frame"), at: Stamp::default() };
+    assert_eq!(decoder.decode(&received, &mut Vec::new()), Decoded::OtherFrame);
+    assert_eq!(decoder.wrong_lengths(multiplexed.id), 0);
 }
 
 #[test]

@@ -28,6 +28,9 @@ pub fn event_text(event: &LogEvent) -> EventText {
         LogEvent::ReadAgain(node, changes) if changes.is_empty() => {
             of_node(*node, "read-again", Info, format!("node {node} was read again: its setup is unchanged"))
         }
+        LogEvent::ReadAgain(node, changes) if changes.iter().any(|change| matches!(change, Change::Device(..))) => {
+            of_node(*node, "replaced", Warning, changed_text(*node, changes))
+        }
         LogEvent::ReadAgain(node, changes) => of_node(*node, "changed", Warning, changed_text(*node, changes)),
         LogEvent::Unreadable(node, why) => of_node(*node, "unreadable", Warning, unreadable_text(*node, why)),
         LogEvent::HeartbeatLost(node, since) => {
@@ -137,8 +140,15 @@ pub fn two_senders(number: TpdoNumber) -> String {
 pub fn remark_text(remark: &Remark) -> String {
     match remark {
         Remark::NoRequestedSignal(node) => format!("node {node} has none of the requested signals"),
-        Remark::SharedCobId(id, [one, other]) => {
+        Remark::SharedCobId(id, [(one, first), (other, second)]) if one == other => {
+            format!("node {one}: {first} and {second} have the same COB-ID {id}: they are ignored")
+        }
+        Remark::SharedCobId(id, [(one, _), (other, _)]) => {
             format!("nodes {one} and {other} both send TPDOs with COB-ID {id}: these TPDOs are ignored")
+        }
+        Remark::NotDecoded(node, number, code) => format!("node {node}: {}", diagnosis::not_decoded(*number, *code)),
+        Remark::UnknownMapping(node, id) => {
+            format!("node {node}: TPDOs with COB-ID {id} are ignored: their mapping is unknown")
         }
         Remark::FreshnessNotProven => {
             "values were sent on remote request and may be old (--poll reads new values)".to_owned()

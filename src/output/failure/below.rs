@@ -161,7 +161,7 @@ fn silence_advice(node: NodeId, waited: Duration, started: bool, missed: MissedA
             )
         }
         Some(_) => "if its SDO channel has other COB-IDs, add: --sdo 0xTX:0xRX".to_owned(),
-        None => check_node(Some(node)),
+        None => check_silent_node(node),
     })
 }
 
@@ -170,6 +170,11 @@ fn silence_advice(node: NodeId, waited: Duration, started: bool, missed: MissedA
 pub(super) fn check_node(node: Option<NodeId>) -> String {
     let node = node.map_or_else(|| "all".to_owned(), |node| node.to_string());
     format!("check its node-ID, power and cable; find the cause: cangauge doctor {node}")
+}
+
+/// What to do about a node that answers nothing. A stopped node without heartbeat looks the same.
+pub(super) fn check_silent_node(node: NodeId) -> String {
+    format!("check its node-ID, power and cable, and that it is not stopped; find the cause: cangauge doctor {node}")
 }
 
 /// An LSS service failed.

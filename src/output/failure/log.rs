@@ -44,12 +44,9 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         LogFailure::TwoSenders(number) => {
             Words::new(two_senders(*number)).hint("disconnect one of them, or change its node-ID: cangauge lss scan")
         }
-        LogFailure::UnknownMapping => {
-            let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
-            Words::new("the mapping of its TPDOs is unknown").hint(format!(
-                "name the device: --device {node}=mh4 (or a file), or start recording before another master reads it"
-            ))
-        }
+        LogFailure::Replaced => Words::new("another device has replaced it: its rows are in a new file"),
+        LogFailure::UnknownMapping => unknown_mapping(failure),
+        LogFailure::OtherLength { mapped, received, is_live } => other_length(failure, *mapped, *received, *is_live),
         LogFailure::NothingReceived { within, nodes, has_traffic, interface } => {
             nothing_received(*within, nodes, *has_traffic, interface.as_deref())
         }
@@ -71,6 +68,22 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         }
         LogFailure::EventsLost { output } => Words::new(format!("events lost: {output} could not keep up")),
     }
+}
+
+fn unknown_mapping(failure: &Failure) -> Words {
+    let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
+    Words::new("the mapping of its TPDOs is unknown").hint(format!(
+        "name the device: --device {node}=mh4 (or a file), or start recording before another master reads it"
+    ))
+}
+
+fn other_length(failure: &Failure, mapped: usize, received: usize, is_live: bool) -> Words {
+    let words = Words::new(diagnosis::wrong_length(mapped, received));
+    let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
+    words.hint(match is_live {
+        true => "read by SDO instead: omit --passive, and add --poll 100ms".to_owned(),
+        false => format!("name a description that has its mapping: --device {node}=FILE, or --eds {node}=FILE"),
+    })
 }
 
 fn no_rtr(number: TpdoNumber) -> Words {

@@ -16,7 +16,8 @@ pub(super) fn words(failure: &Failure, cause: &NmtFailure) -> Words {
         }
         NmtFailure::NotConfirmed => Words::new("command sent, not confirmed: the node sends no heartbeat (1017h is 0)")
             .hint(format!("set a heartbeat: cangauge sdo write {node} producer-heartbeat-time 1000")),
-        NmtFailure::Absent => Words::new("no heartbeat and no SDO answer").hint(below::check_node(failure.node)),
+        NmtFailure::Absent => Words::new("no heartbeat and no SDO answer")
+            .hint(failure.node.map_or_else(|| below::check_node(None), below::check_silent_node)),
         NmtFailure::NotRecorded(error) => {
             Words::new(format!("write the journal {}: {}; nothing was changed", error.file, error.reason))
                 .hint("choose a writable folder: XDG_STATE_HOME=/tmp/state cangauge …")

@@ -110,6 +110,15 @@ impl RowSink {
         self.writer.start_file(header)
     }
 
+    /// Starts the next file for the following rows. Without a series, the same file continues.
+    pub(super) fn start_next_file(&mut self, columns: Columns<'_>) -> io::Result<()> {
+        if self.rows == 0 || !self.setup.has_series {
+            return Ok(());
+        }
+        self.flush()?;
+        self.start_file(columns)
+    }
+
     /// Changes the columns for the following rows.
     pub(super) fn change_columns(&mut self, columns: Columns<'_>) -> io::Result<()> {
         if self.rows == 0 && !self.setup.continues {

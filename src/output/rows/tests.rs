@@ -171,6 +171,31 @@ fn values(files: &[String]) -> Vec<Vec<u64>> {
 }
 
 #[test]
+fn rows_of_a_device_that_replaces_another_are_in_the_next_file() {
+    for (has_series, expected) in [(true, vec![vec![0], vec![1]]), (false, vec![vec![0, 1]])] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let base = folder.path().join("run.csv");
+        let file = fs::File::create(Series::name(&base, 1)).expect("created");
+        let target = OutputTarget::File { file, path: base.clone(), keep: 0 };
+        let writer = LineWriter::direct(target, has_series.then(|| Series::new(&base, 2, false)));
+        let mut rows = Rows::new(writer, Setup { has_series, ..Setup::default() });
+        // Before the first row, the file is still empty.
+        rows.start_file(at(0)).expect("memory");
+        for number in 0..2 {
+            let row = sample(number * 1000, Some(Number::Decimal { mantissa: number.into(), digits: 0 }), None, &[]);
+            rows.put(None, &[row], &[source("ch1", "")]).expect("written");
+            if number == 0 {
+                rows.start_file(at(1)).expect("the next file");
+            }
+        }
+        rows.finish(&mut || false).expect("written");
+        let read = |number| fs::read_to_string(Series::name(&base, number)).expect("a file");
+        let files: Vec<String> = Series::existing(&base).expect("the folder").into_iter().map(read).collect();
+        assert_eq!(values(&files), expected);
+    }
+}
+
+#[test]
 fn rotation_by_time_loses_no_row() {
     let files = values(&rotated(Rotation::Every(Duration::from_secs(1)), 10));
     assert_eq!(files, [vec![0, 1, 2, 3], vec![4, 5, 6, 7], vec![8, 9]]);

@@ -51,6 +51,9 @@ pub fn questions(node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Vec<ObjectId> 
         }
         let values = || tpdo.mapping.iter().map(|entry| entry.object);
         objects.extend(values().filter_map(|value| operating_mode(node, value)));
+        if matches!(tpdo.transmission, Some(Transmission::Sync(_))) {
+            objects.push(tpdo.number.communication(6));
+        }
         if matches!(tpdo.transmission, Some(Transmission::AcyclicSync | Transmission::Sync(_) | Transmission::Rtr(_))) {
             continue;
         }

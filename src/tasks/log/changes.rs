@@ -41,7 +41,7 @@ pub enum TpdoChange {
 }
 
 /// The differences between two surveys of a node; empty if there are none.
-pub(super) fn changes(before: &Node, now: &Node) -> Vec<Change> {
+pub(in crate::tasks) fn changes(before: &Node, now: &Node) -> Vec<Change> {
     let mut changes = Vec::new();
     let (old, new) = (&before.identity, &now.identity);
     if (old.vendor, old.product, old.serial) != (new.vendor, new.product, new.serial) {

@@ -37,8 +37,19 @@ pub enum LogFailure {
     SecondSyncProducer,
     /// Two devices send this TPDO of the node.
     TwoSenders(TpdoNumber),
+    /// Another device has replaced the node.
+    Replaced,
     /// The node sends TPDOs whose mapping is unknown.
     UnknownMapping,
+    /// A passive recording received only TPDOs of a wrong length from the node.
+    OtherLength {
+        /// The length of their mapping in bytes.
+        mapped: usize,
+        /// Their length in bytes.
+        received: usize,
+        /// `false` for a recording that is replayed.
+        is_live: bool,
+    },
     /// A passive recording received no TPDO of these nodes.
     NothingReceived {
         /// The waiting time.
@@ -115,12 +126,13 @@ impl LogFailure {
             | LogFailure::NoStatus { .. }
             | LogFailure::UnknownMapping
             | LogFailure::OtherColumns { .. } => Kind::Usage,
-            LogFailure::NotMapped { .. } | LogFailure::TwoSenders(_) => Kind::Unexpected,
+            LogFailure::NotMapped { .. } | LogFailure::TwoSenders(_) | LogFailure::Replaced => Kind::Unexpected,
             LogFailure::NoRtr { .. } => Kind::Refused,
             LogFailure::DifferentSyncIds(_) | LogFailure::DifferentSyncCounters(_) | LogFailure::SecondSyncProducer => {
                 Kind::CheckFailed
             }
             LogFailure::NothingReceived { .. }
+            | LogFailure::OtherLength { .. }
             | LogFailure::NoMeasurements { .. }
             | LogFailure::NodesLost { all: true, .. } => Kind::NoAnswer,
             LogFailure::NodesLost { all: false, .. } => Kind::Partial,

@@ -15,7 +15,7 @@ use crate::measure::sample::Number;
 use crate::node::overheard::{Overheard, first_four};
 use crate::node::signals;
 use crate::node::{Node, Overrides};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Reads the setup of nodes from the SDO traffic of other masters.
@@ -26,8 +26,8 @@ pub(in crate::tasks) struct SetupListener {
     overheard: Overheard,
     /// COB-IDs of the TPDOs that are decoded.
     decoded: BTreeSet<CanId>,
-    /// Nodes that sent TPDOs whose mapping is unknown.
-    pub(in crate::tasks) not_understood: BTreeSet<NodeId>,
+    /// COB-IDs of TPDOs whose mapping is unknown, and the nodes that sent them.
+    pub(in crate::tasks) not_understood: BTreeMap<CanId, NodeId>,
 }
 
 impl SetupListener {
@@ -38,7 +38,7 @@ impl SetupListener {
             wanted: wanted.to_vec(),
             overheard: Overheard::default(),
             decoded: BTreeSet::new(),
-            not_understood: BTreeSet::new(),
+            not_understood: BTreeMap::new(),
         }
     }
 
@@ -60,7 +60,7 @@ impl SetupListener {
             && self.nodes.contains(&node)
             && !self.decoded.contains(&frame.id())
         {
-            self.not_understood.insert(node);
+            self.not_understood.insert(frame.id(), node);
         }
         None
     }
@@ -85,6 +85,12 @@ impl SetupListener {
     /// The description that the user named for a node, unless the node reports another vendor or product.
     fn named(&self, node: NodeId) -> Option<&Arc<Model>> {
         self.overrides.get(&node).filter(|model| self.overheard.identity(node).fits(model))
+    }
+
+    /// The number in an object of four bytes. An answer with fewer bytes is not used, and replaces no default.
+    fn word(&self, node: NodeId, object: ObjectId) -> Option<u32> {
+        let is_cut = self.overheard.bytes(node, object).is_some_and(|bytes| bytes.len() < 4);
+        self.number(node, object).filter(|_| !is_cut)
     }
 
     fn byte(&self, node: NodeId, object: ObjectId) -> Option<u8> {
@@ -113,7 +119,7 @@ impl SetupListener {
         if !node.tpdos.is_empty() {
             decoder.replace(node.layout(), &node.all_wanted(&self.wanted));
             self.decoded = decoder.can_ids().collect();
-            self.not_understood.remove(&id);
+            self.not_understood.retain(|id, _| !self.decoded.contains(id));
         }
     }
 
@@ -131,10 +137,10 @@ impl SetupListener {
     }
 
     fn tpdo(&self, node: NodeId, number: TpdoNumber) -> Option<Tpdo> {
-        let cob_id = CobId(self.number(node, number.communication(1))?);
+        let cob_id = CobId(self.word(node, number.communication(1))?);
         let count = self.byte(node, number.mapping(0)).filter(|&count| count <= 64)?;
         let mapping: Option<Vec<MappingEntry>> =
-            (1..=count).map(|sub| self.number(node, number.mapping(sub)).map(MappingEntry::from_word)).collect();
+            (1..=count).map(|sub| self.word(node, number.mapping(sub)).map(MappingEntry::from_word)).collect();
         let transmission = self.byte(node, number.communication(2)).map(Transmission::from_code);
         Some(Tpdo { number, cob_id, transmission, event_timer_ms: None, mapping: mapping? })
     }
@@ -168,7 +174,7 @@ impl SetupListener {
     /// The signal with its unit, its digits and its range, as far as they are known.
     fn with_unit(&self, node: &Node, mut signal: Signal) -> Signal {
         let [unit, digits] = signals::unit_and_digits(node, &signal);
-        let unit = unit.and_then(|object| self.number(node.id, object)).map(Unit);
+        let unit = unit.and_then(|object| self.word(node.id, object)).map(Unit);
         signal.unit = unit.or(signal.unit).or_else(|| node.fixed_unit(signal.value_object.0));
         signal.digits = digits.and_then(|object| self.byte(node.id, object));
         if let Some(step) = signals::step(node, &signal) {
@@ -197,7 +203,7 @@ fn is_setup(object: ObjectId) -> bool {
 }
 
 /// The node that sends TPDOs with this COB-ID in the predefined connection set.
-fn predefined_tpdo(frame: &Frame) -> Option<NodeId> {
+pub(super) fn predefined_tpdo(frame: &Frame) -> Option<NodeId> {
     match frame.id() {
         CanId::Standard(id) if matches!(id & 0x780, 0x180 | 0x280 | 0x380 | 0x480) && !frame.is_remote() => {
             NodeId::new((id & 0x7f) as u8).ok()

@@ -86,6 +86,11 @@ impl Producer {
         }
     }
 
+    /// SYNC messages sent so far.
+    pub(super) fn sent(&self) -> u64 {
+        self.statistics.sent
+    }
+
     /// Ends the production and returns the statistics of the sent frames.
     pub(super) fn finish(mut self, master: &mut Master<'_>) -> SyncStatistics {
         self.check_sent(master);

@@ -64,6 +64,12 @@ pub(super) struct Recording<'o> {
     pub(super) has_traffic: bool,
     /// SYNC messages of other nodes by COB-ID, and the length of the last one.
     pub(super) syncs_received: BTreeMap<CanId, (u64, usize)>,
+    /// Whether frames with all COB-IDs are received.
+    receives_all: bool,
+    /// COB-IDs of frames that may be TPDOs of silent nodes.
+    pub(super) unknown_cob_ids: BTreeSet<CanId>,
+    /// Nodes that were replaced by other devices.
+    replaced: BTreeSet<NodeId>,
     pub(super) questions: Questions,
     started: Mono,
     /// Nodes whose TPDOs were reported to have a wrong length.
@@ -108,6 +114,9 @@ impl<'o> Recording<'o> {
             interface: bus.is_live().then(|| bus.name().to_owned()),
             has_traffic: false,
             syncs_received: BTreeMap::new(),
+            receives_all: false,
+            unknown_cob_ids: BTreeSet::new(),
+            replaced: BTreeSet::new(),
             questions: Questions::default(),
             started: bus.mono(),
             wrong_length_reported: BTreeSet::new(),
@@ -229,9 +238,9 @@ impl<'o> Recording<'o> {
         self.tally.set_sources(self.decoder.sources());
     }
 
-    /// The filters for TPDOs, emergencies, heartbeats and SDO messages of the recorded nodes, and for SYNC.
+    /// The filters for TPDOs, emergencies, heartbeats and SDO messages of the recorded nodes, and for SYNC and NMT.
     pub(super) fn filters(&self) -> Filters {
-        let mut ids: Vec<CanId> = self.decoder.can_ids().collect();
+        let mut ids: Vec<CanId> = self.decoder.can_ids().chain([CanId::NMT]).collect();
         for node in &self.nodes {
             let id = node.id;
             ids.extend([node.emergency, node.sync, CanId::heartbeat(id)]);
@@ -253,6 +262,7 @@ impl<'o> Recording<'o> {
                 let node = listener.known_node(node);
                 self.emergencies.learn(&node);
                 self.synced.set_up(&node);
+                self.report_shared_cob_ids(received.at, observer);
             }
             self.update_sources();
         }

@@ -15,8 +15,13 @@ use std::time::Duration;
 pub enum Remark {
     /// The node has none of the requested signals.
     NoRequestedSignal(NodeId),
-    /// Both nodes send TPDOs with this COB-ID. These TPDOs are ignored.
-    SharedCobId(CanId, [NodeId; 2]),
+    /// Two TPDOs, of one node or of two nodes, have this COB-ID. They are ignored.
+    SharedCobId(CanId, [(NodeId, TpdoNumber); 2]),
+    /// A valid TPDO is not decoded. The number is 1Axxh:0: FEh and FFh mean multiplexed PDOs; `None` if the mapping could
+    /// not be read.
+    NotDecoded(NodeId, TpdoNumber, Option<u8>),
+    /// TPDOs of the node with this COB-ID were ignored, because their mapping is unknown.
+    UnknownMapping(NodeId, CanId),
     /// The values were sent on remote request, so it is not proven that each value is new.
     FreshnessNotProven,
     /// A TPDO of the node arrives twice at a SYNC, with the same values.

@@ -4,13 +4,12 @@ use super::recording::Recording;
 use super::{FIRST_SAMPLE_TIMEOUT, LogFailure, LogOptions, Mode};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
+use crate::canopen::pdo::TpdoNumber;
 use crate::master::Master;
 use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use crate::tasks::Failure;
-use crate::tasks::diagnosis::{
-    Findings, Heard, Inquiry, Running, Silence, SilenceCause, Situation, diagnose, questions,
-};
+use crate::tasks::diagnosis::{Findings, Heard, Inquiry, Silence, SilenceCause, Situation, diagnose, questions};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -44,10 +43,19 @@ pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Fa
     if let Some((&node, &number)) = recording.two_senders.first_key_value() {
         return Failure::at(node, LogFailure::TwoSenders(number));
     }
-    if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.first()) {
+    if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.values().min()) {
         return Failure::at(node, LogFailure::UnknownMapping);
     }
     if recording.nodes.is_empty() {
+        let lengths = |&node: &NodeId| Some((node, recording.decoder.wrong_length(node)?));
+        if let Some((node, (mapped, received))) = options.nodes.iter().find_map(lengths) {
+            let is_live = recording.interface.is_some();
+            return Failure::at(node, LogFailure::OtherLength { mapped, received, is_live });
+        }
+        if let Some((id, [(node, one), (_, other)])) = recording.decoder.shared_cob_ids().next() {
+            let nodes = vec![(node, Silence::of(SilenceCause::SameCobId(id, [one, other])))];
+            return Failure::at(node, LogFailure::NoMeasurements { within, nodes });
+        }
         let state = |node: &NodeId| recording.heard.get(node).and_then(|heard| heard.state);
         let nodes = options.nodes.iter().map(|node| (*node, state(node))).collect();
         let (has_traffic, interface) = (recording.has_traffic, recording.interface.clone());
@@ -94,7 +102,7 @@ impl Recording<'_> {
     /// Why a node or a source has no values.
     pub(super) fn silence(&self, silent: Silent) -> Silence {
         let id = silent.node();
-        let of_recording = |cause| Silence { cause, emergency: None, running: Running::Unknown };
+        let of_recording = Silence::of;
         if !self.link_is_up {
             return of_recording(SilenceCause::InterfaceDown);
         }
@@ -108,12 +116,13 @@ impl Recording<'_> {
             return of_recording(SilenceCause::NoTpdo);
         };
         let carries = |tpdo: &Tpdo| self.carries(silent, tpdo);
+        let (heard, wrong_length) = (self.heard.get(&id).copied().unwrap_or_default(), self.decoder.wrong_length(id));
         let heard = Heard {
-            sends_tpdos: self.has_sent(id) || self.decoder.wrong_length(id).is_some(),
-            wrong_length: self.decoder.wrong_length(id),
+            sends_tpdos: heard.sends_tpdos || self.has_sent(id) || wrong_length.is_some(),
+            wrong_length,
             shared: self.shared_cob_id(node, &carries),
             syncs: self.syncs_received.get(&node.sync).copied().unwrap_or_default(),
-            ..self.heard.get(&id).copied().unwrap_or_default()
+            ..heard
         };
         let situation = Situation {
             waited: self.waited(),
@@ -121,7 +130,8 @@ impl Recording<'_> {
             requests: matches!(self.options.mode, Mode::Request(_)),
             was_started: self.states.has_started(id),
         };
-        diagnose(node, &carries, &heard, self.questions.findings.get(&id), &situation)
+        let silence = diagnose(node, &carries, &heard, self.questions.findings.get(&id), &situation);
+        Silence { unknown_cob_ids: self.unknown_cob_ids.iter().copied().collect(), ..silence }
     }
 
     /// Whether a TPDO contains recorded values of a silent node or source.
@@ -133,16 +143,16 @@ impl Recording<'_> {
         }
     }
 
-    /// A COB-ID that another recorded node uses for TPDOs, too.
-    fn shared_cob_id(&self, node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Option<(CanId, NodeId)> {
-        let valid = |node: &Node| {
-            node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).map(|tpdo| tpdo.cob_id.can_id()).collect::<Vec<_>>()
-        };
-        let own = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid() && carries(tpdo));
-        let mut own = own.map(|tpdo| tpdo.cob_id.can_id());
-        own.find_map(|id| {
-            let other = self.nodes.iter().find(|other| other.id != node.id && valid(other).contains(&id))?;
-            Some((id, other.id))
+    /// A COB-ID of a TPDO with requested values that another TPDO has, too.
+    fn shared_cob_id(
+        &self,
+        node: &Node,
+        carries: &dyn Fn(&Tpdo) -> bool,
+    ) -> Option<(CanId, [(NodeId, TpdoNumber); 2])> {
+        let mut own = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid() && carries(tpdo));
+        own.find_map(|tpdo| {
+            let id = tpdo.cob_id.can_id();
+            Some((id, self.decoder.shared_cob_id(id)?))
         })
     }
 

@@ -3,20 +3,21 @@
 use super::failure::PdoFailure;
 use crate::bus::{BusError, Filters, Mono, Received, Stamp};
 use crate::canopen::emcy::Emergency;
+use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::Life;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::TpdoNumber;
-use crate::master::{Error, Happening, Master};
+use crate::master::{Answer, Error, Happening, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::layout::Tpdo;
 use crate::measure::sample::{Sample, Source};
-use crate::node::survey::{SETUP_TIMEOUT, survey_each};
+use crate::node::survey::{BackgroundSurvey, SETUP_TIMEOUT, survey_each};
 use crate::node::wait::{Policy, Until, Waiter, run};
 use crate::node::{Node, Overrides};
 use crate::tasks::Failure;
 use crate::tasks::diagnosis::{Findings, Heard, Inquiry, Silence, Situation, diagnose, questions};
-use crate::tasks::log::{LogFailure, SetupListener, compare_values};
+use crate::tasks::log::{LogFailure, SetupListener, changes, compare_values};
 use crate::tasks::synced::{Surplus, SyncedTpdos};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
@@ -44,17 +45,21 @@ pub enum WatchEvent<'a> {
         /// The sources of the decoder: each sample contains the number of its source.
         sources: &'a [Source],
     },
-    /// A TPDO with a length different from its mapping.
+    /// A TPDO has a length different from its mapping. Reported once.
     WrongLength {
-        /// When it was received.
-        at: Stamp,
         /// The node that sent it.
         node: NodeId,
         /// The TPDO.
         number: TpdoNumber,
+        /// The length of its mapping in bytes.
+        mapped: usize,
         /// Its length in bytes.
         length: usize,
+        /// Whether its mapped bytes are shown. They are ignored otherwise.
+        is_used: bool,
     },
+    /// At the end: the number of TPDOs of a node with a wrong length.
+    WrongLengths(NodeId, u64),
     /// A node restarted, so its mapping may have changed.
     Restarted(NodeId),
     /// The mapping of a node could not be read, so its TPDOs are not shown.
@@ -87,6 +92,7 @@ pub fn watch(
         };
         watcher.learn(setup, overrides);
         run(master, Policy::Record, &mut watcher)?;
+        watcher.report_wrong_lengths();
         return Ok(Vec::new());
     }
     master.listen_to(nodes)?;
@@ -115,14 +121,14 @@ pub fn watch(
     let mut watcher = Watcher::new(surveyed, start, end_after(start), on_event);
     watcher.failures = failures;
     watcher.next = watcher.end.min(start + FIRST_TPDO_TIMEOUT);
+    watcher.overrides = overrides.clone();
     for node in watcher.nodes.clone() {
         watcher.decoder.add(node.layout(), &[]);
         watcher.set_up(&node);
     }
-    let own = |node: &Node| [CanId::heartbeat(node.id), CanId::sdo_response(node.id), node.sync, node.emergency];
-    let ids: BTreeSet<CanId> = watcher.numbers.keys().copied().chain(watcher.nodes.iter().flat_map(own)).collect();
-    master.listen(&Filters::Only(ids.into_iter().collect()))?;
+    watcher.listen(master)?;
     run(master, Policy::Record, &mut watcher)?;
+    watcher.report_wrong_lengths();
     Ok(watcher.failures)
 }
 
@@ -137,6 +143,13 @@ struct Watcher<'a> {
     heard: BTreeMap<NodeId, (Heard, Mono)>,
     /// The reads from silent nodes.
     inquiry: Option<Inquiry>,
+    overrides: Overrides,
+    /// Nodes whose mapping is read again because of a TPDO that is longer; `None` after the end of the read.
+    rereads: BTreeMap<NodeId, Option<BackgroundSurvey>>,
+    /// TPDOs whose wrong length was reported, and whether they were used.
+    reported: BTreeSet<(CanId, bool)>,
+    /// TPDOs with a wrong length before the mapping of the node was read again.
+    wrong_lengths: BTreeMap<NodeId, u64>,
     samples: Vec<Sample>,
     start: Mono,
     end: Mono,
@@ -162,6 +175,10 @@ impl<'a> Watcher<'a> {
             synced: SyncedTpdos::default(),
             heard: BTreeMap::new(),
             inquiry: None,
+            overrides: Overrides::default(),
+            rereads: BTreeMap::new(),
+            reported: BTreeSet::new(),
+            wrong_lengths: BTreeMap::new(),
             samples: Vec::new(),
             start,
             end,
@@ -186,7 +203,13 @@ impl<'a> Watcher<'a> {
         self.setup = Some(setup);
     }
 
-    fn on_frame(&mut self, received: &Received) -> ControlFlow<()> {
+    fn listen(&self, master: &mut Master<'_>) -> Result<(), Error> {
+        let own = |node: &Node| [CanId::heartbeat(node.id), CanId::sdo_response(node.id), node.sync, node.emergency];
+        let ids: BTreeSet<CanId> = self.numbers.keys().copied().chain(self.nodes.iter().flat_map(own)).collect();
+        master.listen(&Filters::Only(ids.into_iter().collect()))
+    }
+
+    fn on_frame(&mut self, received: &Received, master: &mut Master<'_>) -> ControlFlow<()> {
         let at = received.at;
         if let Some(setup) = &mut self.setup {
             if let Some(node) = setup.take(received, &mut self.decoder) {
@@ -211,10 +234,77 @@ impl<'a> Watcher<'a> {
             }
             (Decoded::WrongLength(node), Some(&number)) => {
                 self.has_received = true;
-                let length = received.frame.data().len();
-                (self.on_event)(&WatchEvent::WrongLength { at, node, number, length })
+                self.on_wrong_length(node, number, &received.frame, master)
             }
             _ => self.on_other_frame(received),
+        }
+    }
+
+    /// Handles a TPDO whose length differs from its mapping. After the first longer one, the mapping is read again.
+    fn on_wrong_length(
+        &mut self,
+        node: NodeId,
+        number: TpdoNumber,
+        frame: &Frame,
+        master: &mut Master<'_>,
+    ) -> ControlFlow<()> {
+        let (id, length) = (frame.id(), frame.data().len());
+        let mapped = self.decoder.mapped_length(id).map_or(0, |(_, mapped)| mapped);
+        let is_longer = length > mapped && self.setup.is_none();
+        if is_longer && !self.rereads.contains_key(&node) {
+            self.rereads.insert(node, Some(BackgroundSurvey::start(node, &self.overrides, master)));
+        }
+        let is_read = matches!(self.rereads.get(&node), Some(Some(_)));
+        if is_longer && is_read || !self.reported.insert((id, false)) {
+            return ControlFlow::Continue(());
+        }
+        (self.on_event)(&WatchEvent::WrongLength { node, number, mapped, length, is_used: false })
+    }
+
+    /// Handles an answer of a node whose mapping is read again. If the mapping is unchanged, TPDOs that are always
+    /// longer are used.
+    fn read_again(
+        &mut self,
+        ticket: Ticket,
+        result: &Result<Answer, SdoError>,
+        master: &mut Master<'_>,
+    ) -> Result<ControlFlow<()>, Error> {
+        let mut open = self.rereads.iter_mut().filter_map(|(&id, survey)| Some((id, survey.as_mut()?)));
+        let Some((id, survey)) = open.find(|(_, survey)| survey.has(ticket)) else {
+            return Ok(ControlFlow::Continue(()));
+        };
+        let Some(read) = survey.take(ticket, result, master) else { return Ok(ControlFlow::Continue(())) };
+        self.rereads.insert(id, None);
+        let (Ok(node), Some(place)) = (read, self.nodes.iter().position(|node| node.id == id)) else {
+            return Ok(ControlFlow::Continue(()));
+        };
+        let is_unchanged = changes(&self.nodes[place], &node).is_empty();
+        let seen = self.decoder.lengths_seen(id);
+        self.wrong_lengths.insert(id, self.decoder.wrong_lengths(id));
+        self.decoder.replace(node.layout(), &[]);
+        self.set_up(&node);
+        self.nodes[place] = node;
+        self.listen(master)?;
+        let used = if is_unchanged { self.decoder.use_longer(id, &seen) } else { Vec::new() };
+        for (cob_id, mapped, length) in used {
+            if let Some(&number) = self.numbers.get(&cob_id).filter(|_| self.reported.insert((cob_id, true))) {
+                let event = WatchEvent::WrongLength { node: id, number, mapped, length, is_used: true };
+                if (self.on_event)(&event).is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn report_wrong_lengths(&mut self) {
+        let nodes: BTreeSet<NodeId> = self.decoder.sources().iter().map(|source| source.node).collect();
+        for node in nodes {
+            let before = self.wrong_lengths.get(&node).copied().unwrap_or_default();
+            let count = before + self.decoder.wrong_lengths(node);
+            if count > 0 && (self.on_event)(&WatchEvent::WrongLengths(node, count)).is_break() {
+                return;
+            }
         }
     }
 
@@ -281,7 +371,7 @@ impl<'a> Watcher<'a> {
         if self.has_received {
             return Ok(ControlFlow::Break(()));
         }
-        if let Some(&node) = self.setup.as_ref().and_then(|setup| setup.not_understood.first()) {
+        if let Some(&node) = self.setup.as_ref().and_then(|setup| setup.not_understood.values().min()) {
             return Err(Failure::at(node, LogFailure::UnknownMapping));
         }
         if self.setup.is_some() {
@@ -311,7 +401,7 @@ impl Waiter for Watcher<'_> {
 
     fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Failure> {
         Ok(match event {
-            Happening::Frame(received) => self.on_frame(&received),
+            Happening::Frame(received) => self.on_frame(&received, master),
             Happening::Ended => return self.result(master),
             Happening::Deadline if self.next == self.end => return self.result(master),
             Happening::Deadline => {
@@ -320,6 +410,9 @@ impl Waiter for Watcher<'_> {
                     self.inquiry = Some(Inquiry::begin(master, &self.questions()));
                 }
                 ControlFlow::Continue(())
+            }
+            Happening::Sdo(ticket, result) if self.rereads.values().flatten().any(|survey| survey.has(ticket)) => {
+                self.read_again(ticket, &result, master)?
             }
             Happening::Sdo(ticket, result) => {
                 let findings = self.inquiry.as_mut().and_then(|inquiry| inquiry.take(ticket, &result, master));

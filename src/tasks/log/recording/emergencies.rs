@@ -19,7 +19,7 @@ pub(super) struct Emergencies {
     models: BTreeMap<NodeId, Arc<Model>>,
     /// The last emergency of each node that repeats it while it is pending ([`Quirk::EmergencyRepeats`]).
     repeating: BTreeMap<NodeId, Option<Emergency>>,
-    /// Emergencies reported less than [`REPEAT_INTERVAL`] ago.
+    /// Emergencies with their code and register that were reported less than [`REPEAT_INTERVAL`] ago.
     recent: Vec<Recent>,
 }
 
@@ -83,7 +83,9 @@ impl Emergencies {
     /// Handles an emergency. Returns whether to report it now; if not, it is counted.
     pub(super) fn is_new(&mut self, node: NodeId, emergency: Emergency, now: Mono) -> bool {
         let mut recent = self.recent.iter_mut();
-        if let Some(recent) = recent.find(|recent| recent.node == node && recent.emergency == emergency) {
+        // The manufacturer bytes may be a counter.
+        let is_same = |of: &Emergency| of.code == emergency.code && of.register == emergency.register;
+        if let Some(recent) = recent.find(|recent| recent.node == node && is_same(&recent.emergency)) {
             recent.count += 1;
             return false;
         }
@@ -156,13 +158,15 @@ mod tests {
         let at = |milliseconds| Mono::at(Duration::from_millis(milliseconds));
         let node = NodeId::new(5).expect("a node-ID");
         let emergency = |text: &str| Emergency::parse(&text.parse().expect("a frame")).expect("an emergency");
-        let (one, other) = (emergency("085#3050810101000000"), emergency("085#3050810102000000"));
+        let (one, other) = (emergency("085#3050810101000000"), emergency("085#3050800101000000"));
         let mut emergencies = Emergencies::default();
         let mut reported = Vec::new();
         for step in 0..1000 {
             let now = at(step * 2);
-            // Alternating emergencies are also limited.
+            // Alternating emergencies are also limited, and those whose manufacturer bytes are a counter.
             let emergency = if step % 2 == 0 { one } else { other };
+            let counter = step.to_le_bytes();
+            let emergency = Emergency { manufacturer: [counter[0], counter[1], 0, 0, 0], ..emergency };
             if emergencies.is_new(node, emergency, now) {
                 reported.push(0);
             }

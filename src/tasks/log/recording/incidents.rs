@@ -2,25 +2,46 @@
 
 use super::Recording;
 use super::emergencies::OverloadChange;
-use crate::bus::{Fault, Mono, Received, Stamp};
+use crate::bus::{Fault, Filters, Mono, Received, Stamp};
 use crate::canopen::emcy::Emergency;
-use crate::canopen::id::NodeId;
-use crate::canopen::nmt::{Life, NmtState};
+use crate::canopen::frame::Frame;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::{Life, NmtCommand, NmtState};
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
+use crate::node::Node;
 use crate::tasks::log::changes::changes;
 use crate::tasks::log::heartbeats::HeartbeatChange;
+use crate::tasks::log::passive::predefined_tpdo;
 use crate::tasks::log::rereads::{Reread, RereadReason, writes_setup};
-use crate::tasks::log::{LogEvent, Observer, Remark};
+use crate::tasks::log::{Change, FIRST_SAMPLE_TIMEOUT, LogEvent, Mode, Observer, Remark};
 use crate::tasks::synced::Surplus;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
+use std::time::Duration;
+
+/// Frames with all COB-IDs are received if a node has sent no values after this time.
+const UNKNOWN_TPDO_DELAY: Duration = Duration::from_secs(1);
 
 impl Recording<'_> {
-    /// Reports COB-IDs that two nodes use for TPDOs.
+    /// Reports COB-IDs of two TPDOs.
     pub(in crate::tasks::log) fn report_shared_cob_ids(&mut self, at: Stamp, observer: &mut dyn Observer) {
-        for (id, (one, other)) in self.decoder.take_shared_cob_ids() {
-            self.remark(Remark::SharedCobId(id, [one, other]), at, observer);
+        for (id, tpdos) in self.decoder.take_shared_cob_ids() {
+            let remark = Remark::SharedCobId(id, tpdos);
+            if !self.remarks.contains(&remark) {
+                self.remark(remark, at, observer);
+            }
         }
+    }
+
+    /// Reports valid TPDOs that cannot be decoded, of nodes with other values. For nodes without values, this is the
+    /// reason at the end.
+    fn report_not_decoded(&mut self, at: Stamp, observer: &mut dyn Observer) {
+        let with_values = |node: &&Node| self.decoder.sources().iter().any(|source| source.node == node.id);
+        let nodes = self.nodes.iter().filter(with_values).filter(|_| self.options.wanted.is_empty());
+        let remarks: Vec<Remark> = nodes
+            .flat_map(|node| node.not_decoded.iter().map(|&(number, code)| Remark::NotDecoded(node.id, number, code)))
+            .collect();
+        remarks.into_iter().for_each(|remark| self.remark(remark, at, observer));
     }
 
     /// Adopts the overloads that the nodes reported before the recording.
@@ -28,8 +49,9 @@ impl Recording<'_> {
         self.nodes.iter().for_each(|node| self.decoder.set_overload(node.id, node.has_overload));
     }
 
-    /// Reports signals whose values may be clipped.
-    pub(in crate::tasks::log) fn report_narrow_values(&mut self, at: Stamp, observer: &mut dyn Observer) {
+    /// Reports TPDOs that cannot be decoded, and signals whose values may be clipped.
+    pub(in crate::tasks::log) fn report_setup(&mut self, at: Stamp, observer: &mut dyn Observer) {
+        self.report_not_decoded(at, observer);
         let narrow: Vec<Remark> = self
             .nodes
             .iter()
@@ -58,9 +80,42 @@ impl Recording<'_> {
             self.wrong_heartbeat_length(node, length, at, observer);
         } else if let Some(node) = writes_setup(frame, &self.nodes) {
             self.request_reread(node, RereadReason::Written, at.mono, master);
+        } else if let Some((command, node)) = NmtCommand::parse(frame) {
+            let state = command.target();
+            let state = (!command.is_reset() && state != NmtState::Operational).then_some(state);
+            let addressed =
+                self.nodes.iter().map(|known| known.id).filter(|&known| node.is_none_or(|node| node == known));
+            addressed.for_each(|node| self.heard.entry(node).or_default().commanded = state);
         } else if !frame.is_remote() && self.nodes.iter().any(|node| node.sync == frame.id()) {
             let (count, length) = self.syncs_received.entry(frame.id()).or_default();
             (*count, *length) = (*count + 1, frame.data().len());
+        } else if let Some((node, _)) = self.decoder.mapped_length(frame.id()).filter(|_| !frame.is_remote()) {
+            // Its mapping is unknown.
+            self.heard.entry(node).or_default().sends_tpdos = true;
+        } else if self.receives_all && self.is_unknown_tpdo(frame) {
+            self.unknown_cob_ids.insert(frame.id());
+        }
+    }
+
+    /// Whether this may be a TPDO of a recorded node with another COB-ID than in 180xh:1. TPDOs of other nodes that
+    /// send heartbeats are excluded.
+    fn is_unknown_tpdo(&self, frame: &Frame) -> bool {
+        let is_of_other = |of: NodeId| self.heard.contains_key(&of) && self.nodes.iter().all(|node| node.id != of);
+        matches!(frame.id(), CanId::Standard(0x181..=0x57f))
+            && !frame.is_remote()
+            && !predefined_tpdo(frame).is_some_and(is_of_other)
+    }
+
+    /// While nodes send no values, receives frames with all COB-IDs: their TPDOs may have other ones than in 180xh:1.
+    pub(super) fn look_for_unknown_tpdos(&mut self, waited: Duration, master: &mut Master<'_>) {
+        let is_due = UNKNOWN_TPDO_DELAY <= waited && waited < FIRST_SAMPLE_TIMEOUT;
+        let is_needed = is_due
+            && matches!(self.options.mode, Mode::AsSent | Mode::Sync(_))
+            && self.liveness.nodes().any(|node| !self.liveness.has_sent(node));
+        if is_needed != self.receives_all {
+            let filters = if is_needed { Filters::All } else { self.filters() };
+            // After a failure of the bus, the reasons are only less exact.
+            self.receives_all = master.listen(&filters).is_ok() && is_needed;
         }
     }
 
@@ -110,6 +165,7 @@ impl Recording<'_> {
         }
         let heard = self.heard.entry(node).or_default();
         (heard.booted, heard.heartbeat_stopped) = (is_boot_up, false);
+        heard.commanded = heard.commanded.filter(|_| !is_boot_up);
         heard.state = match life {
             Life::State(state) => Some(state),
             Life::BootUp => None,
@@ -287,6 +343,9 @@ impl Recording<'_> {
         master.listen(&self.filters())?;
         if may_need_start {
             self.states.start_again(id, master);
+        }
+        if changes.iter().any(|change| matches!(change, Change::Device(..))) {
+            self.replaced.insert(id);
         }
         if !changes.is_empty() {
             self.tally.events.changes += 1;

@@ -5,7 +5,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
 use crate::node::state::Proof;
 use crate::tasks::Failure;
-use crate::tasks::diagnosis::{Running, Silence, SilenceCause};
+use crate::tasks::diagnosis::{Silence, SilenceCause};
 use crate::tasks::log::silence::{Silent, why_nothing};
 use crate::tasks::log::{LogFailure, Mode, RecordingReport, Remark};
 
@@ -17,10 +17,12 @@ impl Recording<'_> {
         let two_senders = self.two_senders.iter();
         let two_senders =
             two_senders.map(|(&node, &number)| Failure::at(node, LogFailure::TwoSenders(number))).collect();
+        let replaced = self.replaced.iter().map(|&node| Failure::at(node, LogFailure::Replaced)).collect();
         let nothing = (self.tally.rows == 0).then(|| why_nothing(&self, self.options));
         RecordingReport {
             failed: Vec::new(),
             two_senders,
+            replaced,
             rows: self.tally.rows,
             length: self.tally.length(),
             lost,
@@ -50,6 +52,8 @@ impl Recording<'_> {
         self.remarks.extend(self.rereads.paused().map(Remark::NotReadAgain));
         self.remarks.extend(self.not_operational());
         if self.tally.rows > 0 {
+            let unknown = self.listener.iter().flat_map(|listener| &listener.not_understood);
+            self.remarks.extend(unknown.map(|(&id, &node)| Remark::UnknownMapping(node, id)));
             let requests = matches!(self.options.mode, Mode::Request(_));
             self.remarks.extend(requests.then_some(Remark::FreshnessNotProven));
             let remarks = self.silence_remarks();
@@ -68,7 +72,7 @@ impl Recording<'_> {
                 by: Proof::Heartbeat,
                 was_started: self.states.has_started(node),
             };
-            let silence = Silence { cause, emergency: heard.emergency, running: Running::Unknown };
+            let silence = Silence { emergency: heard.emergency, ..Silence::of(cause) };
             (was_operational && self.has_sent(node)).then(|| Remark::NotOperational(node, Box::new(silence)))
         };
         self.liveness.nodes().filter_map(remark).collect()

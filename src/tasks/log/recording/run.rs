@@ -171,11 +171,17 @@ impl Recording<'_> {
             return ControlFlow::Continue(());
         }
         schedule.next_tick = now + TICK;
-        if !self.questions.were_asked && now >= schedule.start + FIRST_SAMPLE_TIMEOUT {
-            self.ask_silent_nodes_meanwhile(master);
-        }
+        self.examine_silent_nodes(now.since(schedule.start), master);
         self.report_repeated(master.bus().now(), false, observer);
         observer.tick(master.bus().now(), self.tally.rows)
+    }
+
+    /// Looks for the reasons why nodes send no values.
+    fn examine_silent_nodes(&mut self, waited: Duration, master: &mut Master<'_>) {
+        self.look_for_unknown_tpdos(waited, master);
+        if !self.questions.were_asked && waited >= FIRST_SAMPLE_TIMEOUT {
+            self.ask_silent_nodes_meanwhile(master);
+        }
     }
 
     /// Sends a remote request (RTR) for each TPDO that is recorded.
@@ -227,6 +233,7 @@ impl Waiter for Loop<'_, '_> {
     fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Error> {
         if let Some(producer) = &mut self.producer {
             producer.check_sent(master);
+            self.recording.tally.syncs.sent = producer.sent();
         }
         let Loop { recording, schedule, producer, observer } = self;
         match event {
