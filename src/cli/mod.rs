@@ -296,6 +296,7 @@ impl Command {
             Command::Errors(errors) => errors.clear,
             Command::Pdo(pdo) => pdo.writes(),
             Command::Nmt(nmt) => nmt.writes(),
+            Command::Config(config) => !config.only_reads(),
             Command::Lss(_) | Command::Autozero(_) | Command::Tare(_) | Command::Store(_) | Command::Restore(_) => true,
             _ => false,
         };
@@ -309,7 +310,6 @@ impl Command {
         match self {
             Command::Lss(lss) => lss.changes_devices(),
             Command::Nmt(nmt) => nmt.changes_devices(),
-            Command::Config(config) => !config.only_reads(),
             Command::Autozero(autozero) => !autozero.dry_run,
             _ => self.on_two_devices() == OnTwoDevices::RefuseWrites,
         }
@@ -424,14 +424,15 @@ impl Global {
         for (node, length) in master.odd_heartbeats().filter(|_| self.shows_states) {
             self.console().warn(&output::events::heartbeat_text(node, length));
         }
+        let unknown = master.unknown_objects();
         let finished = bus.finish().or_fail();
         let result = result?;
+        let note = |(&node, objects): (&NodeId, &Vec<_>)| output::failure::unknown_objects(node, objects);
+        unknown.iter().map(note).for_each(|text| self.console().note(&text));
         finished?;
         Ok(result)
     }
-}
 
-impl Global {
     /// Undoes the temporary writes of a killed program on the nodes of this command.
     fn undo_left_behind(&self, master: &mut Master<'_>, bus: &BusSpec) -> anyhow::Result<()> {
         let is_ours = |node: NodeId| match &self.claim {

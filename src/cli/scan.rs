@@ -5,6 +5,7 @@ use super::exit::{IntoFailure, several};
 use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
+use crate::canopen::nmt::NmtState;
 use crate::tasks::Failure;
 use crate::tasks::scan::{Found, ScanFailure, listen, scan};
 use clap::Args;
@@ -78,6 +79,12 @@ impl Scan {
         for other in found.iter().filter(|found| found.is_other_device) {
             global.console().warn(&format!("node {}: the description or EDS is for another device", other.node));
         }
+        for found in found {
+            if let Some(NmtState::Other(state)) = found.state {
+                let text = format!("node {}: its heartbeat has the unknown state byte {state:02X}h", found.node);
+                global.console().warn(&text);
+            }
+        }
         let is_silent = |found: &&Found| !found.device.is_identified && found.failure.is_none();
         for silent in found.iter().filter(is_silent).filter(|_| !self.passive) {
             global
@@ -87,7 +94,7 @@ impl Scan {
         let unknown = found.iter().find(|found| found.state.is_none()).filter(|_| !self.passive);
         if let Some(unknown) = unknown {
             global.console().note(&format!(
-                "State \"-\": unknown (the node sends no heartbeat); find out: cangauge nmt state {} --probe",
+                "State \"-\": unknown (no heartbeat was received); find out: cangauge nmt state {} --probe",
                 unknown.node
             ));
         }

@@ -1,5 +1,6 @@
 //! Frames that were received instead of an answer. They explain why a request failed.
 
+use super::Master;
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
@@ -39,8 +40,31 @@ pub(super) struct MissedAnswers {
     open: BTreeMap<NodeId, (ObjectId, Option<Frame>)>,
     /// The last request of another master to each node.
     foreign_requests: BTreeMap<NodeId, ObjectId>,
+    /// Optional objects without a valid answer.
+    unknown: BTreeSet<(NodeId, ObjectId)>,
     /// Nodes whose request was repeated. Their answers may have another COB-ID.
     repeated: BTreeSet<NodeId>,
+}
+
+impl Master<'_> {
+    /// Records an optional object without a valid answer.
+    pub fn add_unknown(&mut self, node: NodeId, object: ObjectId) {
+        self.sdo.missed_answers.unknown.insert((node, object));
+    }
+
+    /// The state in the last heartbeat of a node, if one was received after its last boot-up message.
+    pub fn last_state(&self, node: NodeId) -> Option<NmtState> {
+        self.sdo.missed_answers.states.get(&node).copied()
+    }
+
+    /// The optional objects without a valid answer, by node.
+    pub fn unknown_objects(&self) -> BTreeMap<NodeId, Vec<ObjectId>> {
+        let mut objects: BTreeMap<NodeId, Vec<ObjectId>> = BTreeMap::new();
+        for &(node, object) in &self.sdo.missed_answers.unknown {
+            objects.entry(node).or_default().push(object);
+        }
+        objects
+    }
 }
 
 impl MissedAnswers {

@@ -208,16 +208,6 @@ impl<'bus> Master<'bus> {
         self.sdo.accept_60(node, quirks.contains(&Quirk::UploadAnswered60));
     }
 
-    /// Sets the reaction if two devices answer with one node-ID.
-    pub fn set_on_two_devices(&mut self, reaction: OnTwoDevices) {
-        self.sdo.set_on_two_devices(reaction);
-    }
-
-    /// The nodes that sent two answers to one request.
-    pub fn second_answers(&self) -> Vec<(NodeId, SecondAnswer)> {
-        self.sdo.second_answers().collect()
-    }
-
     /// The nodes with heartbeats of a length other than one byte, and the length of the first one.
     pub fn odd_heartbeats(&self) -> impl Iterator<Item = (NodeId, usize)> {
         self.sdo.odd_heartbeats()
@@ -232,8 +222,7 @@ impl<'bus> Master<'bus> {
             // A device without a serial number also answers. The write reports a silent device.
             self.transfer_one(Request::read(node, SERIAL_NUMBER).once())?.ok();
         }
-        let operation = Operation::Write;
-        let error = |failure| Err(SdoError { node, object: SERIAL_NUMBER, operation, failure });
+        let error = |failure| Err(SdoError::two_devices(node, SERIAL_NUMBER, Operation::Write, failure));
         Ok(self.sdo.failure_of(node, SERIAL_NUMBER).map_or(Ok(()), error))
     }
 
@@ -446,7 +435,7 @@ impl<'bus> Master<'bus> {
         }
         for (result, &(node, object, operation)) in results.iter_mut().zip(&what) {
             if let (Some(Ok(_)), Some(failure)) = (&result, self.sdo.failure_of(node, object)) {
-                *result = Some(Err(SdoError { node, object, operation, failure }));
+                *result = Some(Err(SdoError::two_devices(node, object, operation, failure)));
             }
         }
         Ok(results.into_iter().flatten().collect())

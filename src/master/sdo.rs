@@ -56,8 +56,8 @@ pub(super) struct SdoClient {
     limit: Option<(Mono, Duration)>,
     /// Whether a node has a waiting transfer and none in progress.
     can_start: bool,
-    on_two_devices: OnTwoDevices,
-    missed_answers: MissedAnswers,
+    pub(super) on_two_devices: OnTwoDevices,
+    pub(super) missed_answers: MissedAnswers,
     /// The length of the first heartbeat of each node whose length is not one byte.
     odd_heartbeats: BTreeMap<NodeId, usize>,
 }
@@ -122,8 +122,8 @@ impl SdoClient {
             if let Some(failure) = node.refusal(on_two_devices) {
                 for (ticket, request) in node.waiting.drain(..) {
                     let (node, object, operation) = (request.node, request.object, request.operation());
-                    self.finished
-                        .push_back((ticket, Err(SdoError { node, object, operation, failure: failure.clone() })));
+                    let error = SdoError::two_devices(node, object, operation, failure.clone());
+                    self.finished.push_back((ticket, Err(error)));
                 }
                 continue;
             }
@@ -304,10 +304,6 @@ impl SdoClient {
             self.missed_answers.end(ticket.node);
         }
         self.can_start |= node.active.is_none() && !node.waiting.is_empty();
-    }
-
-    pub(super) fn set_on_two_devices(&mut self, reaction: OnTwoDevices) {
-        self.on_two_devices = reaction;
     }
 
     /// The nodes with second answers.

@@ -3,9 +3,11 @@
 //! A server answers each request once. Requests of another master and repeated requests also cause further answers, so
 //! such answers are ignored.
 
-use super::request::Operation;
+use super::Master;
+use super::request::{Operation, SdoError, SdoFailure};
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
+use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -49,6 +51,43 @@ impl SecondAnswer {
     /// Whether the answers differ, so that they come from two devices.
     pub fn differs(self) -> bool {
         self.first != self.second
+    }
+}
+
+impl Master<'_> {
+    /// Sets the reaction if two devices answer with one node-ID.
+    pub fn set_on_two_devices(&mut self, reaction: OnTwoDevices) {
+        self.sdo.on_two_devices = reaction;
+    }
+
+    /// Whether transfers with a node-ID continue if two devices answer.
+    pub fn tolerates_two_devices(&self) -> bool {
+        self.sdo.on_two_devices == OnTwoDevices::Report
+    }
+
+    /// The nodes that sent two answers to one request.
+    pub fn second_answers(&self) -> Vec<(NodeId, SecondAnswer)> {
+        self.sdo.second_answers().collect()
+    }
+}
+
+impl SdoError {
+    /// The error of a transfer with a node-ID of two devices. It names the request that got two answers, which may be an
+    /// earlier one.
+    pub(super) fn two_devices(node: NodeId, object: ObjectId, operation: Operation, failure: SdoFailure) -> SdoError {
+        let answers = match &failure {
+            SdoFailure::TwoDevices(Some(answers)) | SdoFailure::NotWritten(answers) => Some(*answers),
+            _ => None,
+        };
+        let is_write = |answers: SecondAnswer| {
+            [answers.first, answers.second].iter().any(|frame| frame.data().first() == Some(&0x60))
+        };
+        let operation = match answers {
+            Some(answers) if is_write(answers) => Operation::Write,
+            Some(_) => Operation::Read,
+            None => operation,
+        };
+        SdoError { node, object: answers.and_then(SecondAnswer::object).unwrap_or(object), operation, failure }
     }
 }
 

@@ -181,7 +181,7 @@ impl Master<'_> {
                         self.await_second_answers(watch)?;
                     }
                     return Ok(result.and_then(|answer| match self.sdo.failure_of(node, object) {
-                        Some(failure) => Err(SdoError { node, object, operation, failure }),
+                        Some(failure) => Err(SdoError::two_devices(node, object, operation, failure)),
                         None => Ok(answer),
                     }));
                 }

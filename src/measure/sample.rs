@@ -212,6 +212,8 @@ pub enum Doubt {
     LooksLikeInteger,
     /// The value is at the end of its integer type, and the measuring range is unknown. The value is kept.
     EndOfType,
+    /// The status object has no valid answer. The value is kept.
+    UnknownStatus,
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use super::survey::Ask;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
-use crate::master::{Answer, Error, SdoError, SdoFailure};
-use std::collections::BTreeSet;
+use crate::master::{Answer, Error, Operation, SdoError, SdoFailure};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// An object to read, with its type.
 pub type Item = (NodeId, ObjectId, DataType);
@@ -23,93 +23,147 @@ pub fn read_values<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Result<
     Ok(values.collect())
 }
 
-/// Like [`read_values`], with `None` if the device rejects the read or the bytes do not fit the type.
-///
-/// # Errors
-/// Also time-outs and protocol violations, because partial results are not returned.
-pub(super) fn read_known<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
-    read_values(master, items)?
-        .into_iter()
-        .map(|result| match result {
-            Ok(value) => Ok(Some(value)),
-            Err(error) => match error.failure {
-                SdoFailure::Refused(_) | SdoFailure::Fit(_) => Ok(None),
-                _ => Err(Error::Sdo(error).into()),
-            },
-        })
-        .collect()
+/// The largest number of objects without an answer, one after the other, from a node that answers other objects.
+const MAX_SILENT: u32 = 8;
+
+/// Reads objects that a device may not have, or may not answer. An object without a valid answer does not affect the
+/// others.
+pub struct Reader<'a, A> {
+    pub(super) master: &'a mut A,
+    /// An object that each node answered. Not 1000h, because some devices answer only this object.
+    answered: BTreeMap<NodeId, ObjectId>,
+    /// The errors of nodes that do not answer any more, or whose answers come from two devices.
+    failed: BTreeMap<NodeId, SdoError>,
 }
 
-/// The answers, and the error of a node that does not answer at all.
-type OptionalAnswers = (Vec<Option<Answer>>, Option<SdoError>);
+/// The first error and the number of a node's objects without an answer, one after the other.
+type Silences = BTreeMap<NodeId, (SdoError, u32)>;
 
-/// Reads optional objects. An object without a valid answer is `None` and does not affect the others.
-///
-/// After a silent sub-index, the other sub-indices of its object are not read. If a node is silent twice in a row, its
-/// remaining objects are `None`, and the error is returned, too.
-///
-/// # Errors
-/// Failures of the bus, and Ctrl-C.
-pub(super) fn ask_optional<A: Ask>(master: &mut A, objects: &[(NodeId, ObjectId)]) -> Result<OptionalAnswers, A::Stop> {
-    let mut answers: Vec<Option<Answer>> = objects.iter().map(|_| None).collect();
-    let mut open: Vec<usize> = (0..objects.len()).collect();
-    let (mut silent, mut dead): (BTreeSet<NodeId>, _) = (BTreeSet::new(), None);
-    let mut repeated = BTreeSet::new();
-    while !open.is_empty() {
-        let asked: Vec<(NodeId, ObjectId)> = open.iter().map(|&at| objects[at]).collect();
-        let results = master.ask(&asked)?;
-        let has_failed = |error: &SdoError| {
-            !matches!(error.failure, SdoFailure::NoAnswer { started: false, .. } | SdoFailure::Cancelled)
-        };
-        let before = repeated.len();
-        let answering: BTreeSet<NodeId> = asked
-            .iter()
-            .zip(&results)
-            .filter(|(_, result)| result.as_ref().err().is_none_or(has_failed))
-            .map(|(&(node, _), _)| node)
-            .collect();
-        let mut rest = Vec::new();
-        let mut unanswered = BTreeSet::new();
-        for (at, result) in open.into_iter().zip(results) {
-            match result {
-                Ok(answer) => answers[at] = Some(answer),
-                Err(error) => match error.failure {
-                    // These objects were not read, because an earlier one got no answer.
-                    SdoFailure::Cancelled => rest.push(at),
-                    SdoFailure::NoAnswer { started: false, .. }
-                        if unanswered.insert((error.node, error.object.index))
-                            && !answering.contains(&error.node)
-                            && !silent.insert(error.node) =>
-                    {
-                        dead = dead.or(Some(error));
+impl<'a, A: Ask> Reader<'a, A> {
+    /// A reader that has read nothing.
+    pub fn new(master: &'a mut A) -> Reader<'a, A> {
+        Reader { master, answered: BTreeMap::new(), failed: BTreeMap::new() }
+    }
+
+    /// Reads objects. One result for each, in their order.
+    ///
+    /// After a silent sub-index, the other sub-indices of its object are not read. A node that is silent twice in a row
+    /// must answer an object that it answered before. Otherwise its remaining objects have the same error.
+    ///
+    /// # Errors
+    /// Failures of the bus, and Ctrl-C. The failure of one device is in its results.
+    pub fn read(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, A::Stop> {
+        let mut results: Vec<Option<Result<Answer, SdoError>>> = objects.iter().map(|_| None).collect();
+        let mut open: Vec<usize> = (0..objects.len()).collect();
+        let (mut repeated, mut silences) = (BTreeSet::new(), Silences::new());
+        while !open.is_empty() {
+            let asked: Vec<(NodeId, ObjectId)> = open.iter().map(|&at| objects[at]).collect();
+            let (mut rest, mut unanswered) = (Vec::new(), BTreeSet::new());
+            let before = repeated.len();
+            for (at, result) in open.into_iter().zip(self.master.ask(&asked)?) {
+                let (node, object) = objects[at];
+                match result.as_ref().map_err(|error| &error.failure) {
+                    // This object was not read, because an earlier one got no answer.
+                    Err(SdoFailure::Cancelled) => {
+                        rest.push(at);
+                        continue;
                     }
-                    SdoFailure::Refused(_) | SdoFailure::Fit(_) | SdoFailure::TwoDevices(_) => {}
-                    SdoFailure::NoAnswer { started: false, .. } => {}
+                    Err(SdoFailure::NoAnswer { started: false, .. }) => {
+                        unanswered.insert((node, object.index));
+                        let error = result.as_ref().err().cloned();
+                        silences.entry(node).or_insert_with(|| (error.expect("an error"), 0)).1 += 1;
+                    }
+                    Err(SdoFailure::TwoDevices(_) | SdoFailure::NotWritten(_)) => {
+                        if !self.master.tolerates_two_devices() {
+                            self.failed.extend(result.as_ref().err().map(|error| (node, error.clone())));
+                        }
+                    }
+                    Err(SdoFailure::Overtime(_)) => {
+                        self.failed.extend(result.as_ref().err().map(|error| (node, error.clone())));
+                    }
+                    Ok(_) | Err(SdoFailure::Refused(_) | SdoFailure::Fit(_)) => {
+                        silences.remove(&node);
+                        if object != ObjectId::DEVICE_TYPE {
+                            self.answered.insert(node, object);
+                        }
+                    }
                     // A transfer that failed in the middle is repeated once.
-                    _ if repeated.insert(at) => rest.push(at),
-                    _ => {}
-                },
+                    Err(_) if repeated.insert(at) => {
+                        rest.push(at);
+                        continue;
+                    }
+                    Err(_) => {}
+                }
+                results[at] = Some(result);
+            }
+            self.check_silent(&silences)?;
+            rest.retain(|&at| {
+                let (node, object) = objects[at];
+                !unanswered.contains(&(node, object.index)) && !self.failed.contains_key(&node)
+            });
+            let is_stuck = rest.len() == asked.len() && repeated.len() == before;
+            open = if is_stuck { Vec::new() } else { rest };
+        }
+        let unread = |(node, object)| {
+            let operation = Operation::Read;
+            let cancelled = SdoError { node, object, operation, failure: SdoFailure::Cancelled };
+            self.failed.get(&node).cloned().unwrap_or(cancelled)
+        };
+        let results = results.into_iter().zip(objects);
+        Ok(results.map(|(result, &object)| result.unwrap_or_else(|| Err(unread(object)))).collect())
+    }
+
+    /// Finds out which of the nodes that are silent twice in a row still answer.
+    fn check_silent(&mut self, silences: &Silences) -> Result<(), A::Stop> {
+        for (&node, (error, count)) in silences.iter().filter(|(_, (_, count))| *count > 1) {
+            let is_alive = match self.answered.get(&node).filter(|_| *count <= MAX_SILENT) {
+                Some(&object) => self.master.ask(&[(node, object)])?.iter().all(|answer| {
+                    answer.as_ref().err().is_none_or(|error| matches!(error.failure, SdoFailure::Refused(_)))
+                }),
+                None => false,
+            };
+            if !is_alive {
+                self.failed.entry(node).or_insert_with(|| error.clone());
             }
         }
-        rest.retain(|&at| !unanswered.contains(&(objects[at].0, objects[at].1.index)));
-        let is_stuck = rest.len() == asked.len() && repeated.len() == before;
-        open = if is_stuck || dead.is_some() { Vec::new() } else { rest };
+        Ok(())
     }
-    Ok((answers, dead))
-}
 
-/// The values of `ask_optional`; `None` also if the bytes do not fit the type.
-///
-/// # Errors
-/// A node is silent twice in a row; failures of the bus, and Ctrl-C.
-pub fn read_optional<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
-    let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
-    let (answers, dead) = ask_optional(master, &objects)?;
-    if let Some(error) = dead {
-        return Err(Error::Sdo(error).into());
+    /// The answers of optional objects; `None` without a valid answer.
+    ///
+    /// # Errors
+    /// A node does not answer any more; failures of the bus, and Ctrl-C.
+    pub(super) fn answers(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Option<Answer>>, A::Stop> {
+        Ok(self.read_optional(objects)?.into_iter().map(Result::ok).collect())
     }
-    let values = answers.into_iter().zip(items).map(|(answer, &(node, object, data_type))| {
-        answer?.value(node, object, Some(data_type)).ok().map(|(value, _)| value)
-    });
-    Ok(values.collect())
+
+    /// Reads optional objects. Those without a valid answer are recorded as unknown.
+    ///
+    /// # Errors
+    /// Like [`Reader::answers`].
+    pub fn read_optional(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, A::Stop> {
+        let results = self.read(objects)?;
+        if let Some(error) = self.failed.values().next() {
+            return Err(Error::Sdo(error.clone()).into());
+        }
+        for error in results.iter().filter_map(|result| result.as_ref().err()) {
+            let is_answered = matches!(error.failure, SdoFailure::Refused(_) | SdoFailure::Fit(_));
+            if !is_answered && !matches!(error.failure, SdoFailure::Cancelled | SdoFailure::TwoDevices(_)) {
+                self.master.add_unknown(error.node, error.object);
+            }
+        }
+        Ok(results)
+    }
+
+    /// The values of optional objects; `None` without a valid answer, or if the bytes do not fit the type.
+    ///
+    /// # Errors
+    /// Like [`Reader::answers`].
+    pub fn values(&mut self, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
+        let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
+        let values = self.answers(&objects)?.into_iter().zip(items).map(|(answer, &(node, object, data_type))| {
+            answer?.value(node, object, Some(data_type)).ok().map(|(value, _)| value)
+        });
+        Ok(values.collect())
+    }
 }

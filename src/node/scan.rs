@@ -7,13 +7,15 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::{Life, NmtState};
 use crate::canopen::object::ObjectId;
-use crate::master::{Error, Happening, Master, Request, SdoFailure, Ticket};
+use crate::master::{Error, Happening, Master, Request, SdoError, SdoFailure, Ticket};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// The bits on the wire of a full transmit queue of 10 frames, each with its answer.
 const FULL_QUEUE_BITS: u64 = 10 * 2 * 135;
+
+const VENDOR: ObjectId = ObjectId::new(0x1018, 1);
 
 /// The time from the first requests to their repetition.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(50);
@@ -30,6 +32,8 @@ pub struct Presence {
     pub states: BTreeMap<NodeId, Option<NmtState>>,
     /// The COB-IDs of received TPDOs, by their node in the predefined connection set.
     pub tpdos: BTreeMap<NodeId, BTreeSet<CanId>>,
+    /// The failed request of the only node that was asked, if a frame with another COB-ID looks like its answer.
+    pub other_channel: Option<SdoError>,
     /// The objects that other masters read and wrote, in a passive scan.
     pub overheard: Overheard,
     booted: BTreeSet<NodeId>,
@@ -88,7 +92,8 @@ fn tpdo_node(id: CanId) -> Option<NodeId> {
     }
 }
 
-/// Reads the device type (1000h) of every node, all in parallel.
+/// Reads the device type (1000h) of every node, all in parallel, and from the second round on the vendor (1018h:1),
+/// because some devices do not answer one of them.
 ///
 /// A heartbeat, a boot-up message or a late answer also counts. Nodes without an answer are asked
 /// `rounds` times; `timeout` is the wait after the last request. If states are unknown, waits at least 200 ms after the
@@ -115,7 +120,8 @@ pub fn find(master: &mut Master<'_>, nodes: &[NodeId], timeout: Duration, rounds
             continue;
         }
         asked_at = master.now();
-        ask(master, &missing, timeout, round + 1 >= rounds, &mut presence)?;
+        let object = if round == 0 { ObjectId::DEVICE_TYPE } else { VENDOR };
+        ask(master, (&missing, object), timeout, round + 1 >= rounds, &mut presence)?;
     }
     wait_for_states(master, asked_at + timeout.min(HEARTBEAT_TIMEOUT), &mut presence)?;
     Ok(presence)
@@ -124,14 +130,14 @@ pub fn find(master: &mut Master<'_>, nodes: &[NodeId], timeout: Duration, rounds
 /// Asks nodes once, and waits for their answers: in the last round until the time-out, else until the next repetition.
 fn ask(
     master: &mut Master<'_>,
-    nodes: &[NodeId],
+    (nodes, object): (&[NodeId], ObjectId),
     timeout: Duration,
     is_last: bool,
     presence: &mut Presence,
 ) -> Result<(), Error> {
     let mut open: BTreeMap<Ticket, NodeId> = BTreeMap::new();
     for &node in nodes {
-        open.insert(master.start(Request::read(node, ObjectId::DEVICE_TYPE).once().within(timeout)), node);
+        open.insert(master.start(Request::read(node, object).once().within(timeout)), node);
     }
     let begin = master.now();
     let mut until = begin + REPEAT_INTERVAL;
@@ -148,6 +154,11 @@ fn ask(
                     );
                     let node = open.remove(&ticket).filter(|_| has_answered);
                     presence.answered.extend(node);
+                    let has_frame = |error: &SdoError| match error.failure {
+                        SdoFailure::NoAnswer { missed, .. } => nodes.len() == 1 && missed.frame.is_some(),
+                        _ => false,
+                    };
+                    presence.other_channel = result.err().filter(has_frame);
                     if open.is_empty() {
                         return ControlFlow::Break(());
                     }

@@ -6,7 +6,7 @@
 mod background;
 mod ranges;
 
-use super::read::{Item, ask_optional, read_known, read_optional, read_values};
+use super::read::{Item, Reader, read_values};
 use super::{Identity, Node, signals};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -49,6 +49,12 @@ pub trait Ask {
 
     /// Sets how a node's SDO server deviates from the standard.
     fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]);
+
+    /// Whether reading continues if two devices answer with one node-ID.
+    fn tolerates_two_devices(&self) -> bool;
+
+    /// Records an optional object without a valid answer.
+    fn add_unknown(&mut self, node: NodeId, object: ObjectId);
 }
 
 impl Ask for Master<'_> {
@@ -62,6 +68,14 @@ impl Ask for Master<'_> {
     fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]) {
         Master::set_quirks(self, node, quirks);
     }
+
+    fn tolerates_two_devices(&self) -> bool {
+        Master::tolerates_two_devices(self)
+    }
+
+    fn add_unknown(&mut self, node: NodeId, object: ObjectId) {
+        Master::add_unknown(self, node, object);
+    }
 }
 
 fn number(value: Option<&Value>) -> Option<u64> {
@@ -74,11 +88,12 @@ fn unsigned<T: TryFrom<u64>>(value: Option<&Value>) -> Option<T> {
 
 /// Reads the identity of nodes. The name (1008h) is read only from the nodes for which `reads_name` is true.
 fn identities<A: Ask>(
-    master: &mut A,
+    reader: &mut Reader<'_, A>,
     nodes: &[NodeId],
     reads_name: impl Fn(NodeId, &Identity) -> bool,
 ) -> Result<Vec<Identity>, A::Stop> {
     let objects = [
+        (ObjectId::DEVICE_TYPE, U32),
         (ObjectId::new(0x1018, 1), U32),
         (ObjectId::new(0x1018, 2), U32),
         (ObjectId::new(0x1018, 3), U32),
@@ -86,18 +101,15 @@ fn identities<A: Ask>(
     ];
     let items: Vec<Item> =
         nodes.iter().flat_map(|&node| objects.map(|(object, data_type)| (node, object, data_type))).collect();
-    let device_types: Vec<Item> = nodes.iter().map(|&node| (node, ObjectId::DEVICE_TYPE, U32)).collect();
-    let device_types = read_known(master, &device_types)?;
-    let values = read_optional(master, &items)?;
+    let values = reader.values(&items)?;
     let mut identities: Vec<Identity> = values
         .chunks(objects.len())
-        .zip(&device_types)
-        .map(|(values, device_type)| Identity {
-            device_type: unsigned(device_type.as_ref()),
-            vendor: unsigned(values[0].as_ref()),
-            product: unsigned(values[1].as_ref()),
-            revision: unsigned(values[2].as_ref()),
-            serial: unsigned(values[3].as_ref()),
+        .map(|values| Identity {
+            device_type: unsigned(values[0].as_ref()),
+            vendor: unsigned(values[1].as_ref()),
+            product: unsigned(values[2].as_ref()),
+            revision: unsigned(values[3].as_ref()),
+            serial: unsigned(values[4].as_ref()),
             name: None,
         })
         .collect();
@@ -105,7 +117,7 @@ fn identities<A: Ask>(
     let named: Vec<NodeId> = nodes.iter().zip(&identities).filter(needs_name).map(|(node, _)| *node).collect();
     let items: Vec<Item> =
         named.iter().map(|&node| (node, ObjectId::new(0x1008, 0), DataType::VisibleString)).collect();
-    let mut names: BTreeMap<NodeId, Option<Value>> = named.into_iter().zip(read_optional(master, &items)?).collect();
+    let mut names: BTreeMap<NodeId, Option<Value>> = named.into_iter().zip(reader.values(&items)?).collect();
     for (identity, node) in identities.iter_mut().zip(nodes) {
         if let Some(Some(Value::Text(name))) = names.remove(node) {
             identity.name = Some(name);
@@ -132,13 +144,14 @@ pub fn revisions(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<N
 /// # Errors
 /// A node does not answer, or the survey cannot continue.
 pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
-    let mut found = identify(master, nodes, overrides)?;
-    read_services(master, &mut found)?;
-    read_tpdos(master, &mut found)?;
-    find_signals(master, &mut found)?;
-    read_units(master, &mut found)?;
-    ranges::read_ranges(master, &mut found)?;
-    ranges::read_overloads(master, &mut found)?;
+    let mut reader = Reader::new(master);
+    let mut found = identify_with(&mut reader, nodes, overrides)?;
+    read_services(&mut reader, &mut found)?;
+    read_tpdos(&mut reader, &mut found)?;
+    find_signals(&mut reader, &mut found)?;
+    read_units(&mut reader, &mut found)?;
+    ranges::read_ranges(&mut reader, &mut found)?;
+    ranges::read_overloads(&mut reader, &mut found)?;
     Ok(found)
 }
 
@@ -148,23 +161,31 @@ pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overri
 /// # Errors
 /// A node does not answer, or the survey cannot continue.
 pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
+    identify_with(&mut Reader::new(master), nodes, overrides)
+}
+
+fn identify_with<A: Ask>(
+    reader: &mut Reader<'_, A>,
+    nodes: &[NodeId],
+    overrides: &Overrides,
+) -> Result<Vec<Node>, A::Stop> {
     // Some devices can be read only with their quirks. So the quirks of the named descriptions are set first.
     for (node, model) in overrides {
-        master.set_quirks(*node, &model.description.quirks);
+        reader.master.set_quirks(*node, &model.description.quirks);
     }
     let reads_name = |node, identity: &Identity| {
         overrides.get(&node).is_none_or(|model| model.description.signals.is_empty() && !identity.fits(model))
     };
-    let identities = identities(master, nodes, reads_name)?;
+    let identities = identities(reader, nodes, reads_name)?;
     let mut traits: Vec<Traits> = identities.iter().map(Identity::traits).collect();
     let questions: Vec<(usize, ObjectId)> = nodes
         .iter()
         .enumerate()
-        .filter(|(_, node)| !overrides.contains_key(node))
+        .filter(|(at, node)| reads_name(**node, &identities[*at]))
         .flat_map(|(at, _)| to_ask(&traits[at]).into_iter().map(move |object| (at, object)))
         .collect();
     let objects: Vec<(NodeId, ObjectId)> = questions.iter().map(|&(at, object)| (nodes[at], object)).collect();
-    for (&(at, object), answer) in questions.iter().zip(ask_optional(master, &objects)?.0) {
+    for (&(at, object), answer) in questions.iter().zip(reader.answers(&objects)?) {
         traits[at].answers.extend(answer.and_then(|answer| answer.uploaded).map(|uploaded| (object, uploaded.bytes)));
     }
     let mut found: Vec<Node> = nodes.iter().map(|&node| Node::new(node)).collect();
@@ -181,13 +202,13 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
         node.identity = identity;
         node.is_identified = true;
         if let Some(model) = &node.model {
-            master.set_quirks(node.id, &model.description.quirks);
+            reader.master.set_quirks(node.id, &model.description.quirks);
         }
     }
     Ok(found)
 }
 
-fn read_services<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
+fn read_services<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let objects = [
         (ObjectId::new(0x1017, 0), U16),
         (ObjectId::new(0x1014, 0), U32),
@@ -198,7 +219,7 @@ fn read_services<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::St
         .iter()
         .flat_map(|node| objects[..3].iter().map(|&(object, data_type)| (node.id, object, data_type)))
         .collect();
-    let values = read_optional(master, &items)?;
+    let values = reader.values(&items)?;
     // If a description lists the SYNC object but not 1019h, the device has no SYNC counter.
     let may_count = |node: &Node| match &node.model {
         Some(model) => model.dictionary.has_index(0x1019) || !model.dictionary.has_index(0x1005),
@@ -206,7 +227,7 @@ fn read_services<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::St
     };
     let counting: Vec<usize> = (0..nodes.len()).filter(|&at| may_count(&nodes[at])).collect();
     let items: Vec<Item> = counting.iter().map(|&at| (nodes[at].id, objects[3].0, objects[3].1)).collect();
-    for (&at, value) in counting.iter().zip(read_optional(master, &items)?) {
+    for (&at, value) in counting.iter().zip(reader.values(&items)?) {
         nodes[at].sync_overflow = unsigned(value.as_ref()).filter(|overflow| (2..=240).contains(overflow));
     }
     for (node, values) in nodes.iter_mut().zip(values.chunks(3)) {
@@ -230,14 +251,14 @@ fn tpdo_numbers(node: &Node) -> Vec<TpdoNumber> {
     if described.is_empty() { (1..=UNDESCRIBED_TPDOS).filter_map(TpdoNumber::new).collect() } else { described }
 }
 
-fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
+fn read_tpdos<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let wanted: Vec<(usize, TpdoNumber)> = nodes
         .iter()
         .enumerate()
         .flat_map(|(at, node)| tpdo_numbers(node).into_iter().map(move |number| (at, number)))
         .collect();
     let items: Vec<Item> = wanted.iter().map(|&(at, number)| (nodes[at].id, number.communication(1), U32)).collect();
-    let cob_ids = read_known(master, &items)?;
+    let cob_ids = reader.values(&items)?;
     let found: Vec<(usize, TpdoNumber, CobId)> = wanted
         .iter()
         .zip(&cob_ids)
@@ -250,7 +271,7 @@ fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
             [(node, number.communication(2), U8), (node, number.communication(5), U16), (node, number.mapping(0), U8)]
         })
         .collect();
-    let values = read_known(master, &items)?;
+    let values = reader.values(&items)?;
     let counts: Vec<u8> = values.chunks(3).map(|values| unsigned(values[2].as_ref()).unwrap_or(0)).collect();
     // FEh and FFh mean multiplexed PDOs (CiA 301, 7.5.2.38), which measuring devices do not send.
     let entries = |count: u8| 1..=if count > 64 { 0 } else { count };
@@ -262,7 +283,7 @@ fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
             entries(count).map(move |sub| (node, number.mapping(sub), U32))
         })
         .collect();
-    let mut words = read_known(master, &items)?.into_iter();
+    let mut words = reader.values(&items)?.into_iter();
     for ((&(at, number, cob_id), values), &count) in found.iter().zip(values.chunks(3)).zip(&counts) {
         let mapping: Option<Vec<MappingEntry>> = entries(count)
             .map(|_| words.next().flatten())
@@ -284,7 +305,7 @@ fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
 }
 
 /// The signals of a description, the channels of CiA 404, or the values of a profile and the contents of the TPDOs.
-fn find_signals<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
+fn find_signals<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let mut unknown = Vec::new();
     let mut others = Vec::new();
     for (at, node) in nodes.iter_mut().enumerate() {
@@ -301,7 +322,7 @@ fn find_signals<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Sto
         .iter()
         .flat_map(|&at| PROCESS_VALUES.map(|(index, _)| (nodes[at].id, ObjectId::new(index, 0), U8)))
         .collect();
-    let counts = read_known(master, &items)?;
+    let counts = reader.values(&items)?;
     for (&at, counts) in unknown.iter().zip(counts.chunks(PROCESS_VALUES.len())) {
         let node = &mut nodes[at];
         let values = channel_values(node, counts);
@@ -310,7 +331,7 @@ fn find_signals<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Sto
             others.push(at);
         }
     }
-    find_objects(master, nodes, &others)
+    find_objects(reader, nodes, &others)
 }
 
 /// The process value of each channel. `counts` are the answers of sub-index 0 of [`PROCESS_VALUES`].
@@ -329,7 +350,7 @@ fn channel_values(node: &Node, counts: &[Option<Value>]) -> Vec<ObjectId> {
 }
 
 /// The signals of devices without channels of CiA 404.
-fn find_objects<A: Ask>(master: &mut A, nodes: &mut [Node], others: &[usize]) -> Result<(), A::Stop> {
+fn find_objects<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node], others: &[usize]) -> Result<(), A::Stop> {
     let rows: Vec<_> = others
         .iter()
         .flat_map(|&at| signals::profile_values(&nodes[at]).map(move |(row, object)| (at, row, object)))
@@ -337,7 +358,7 @@ fn find_objects<A: Ask>(master: &mut A, nodes: &mut [Node], others: &[usize]) ->
     let data_type = |node: &Node, object: ObjectId| node.layout().data_type(object).unwrap_or(U8);
     let items: Vec<Item> =
         rows.iter().map(|&(at, _, object)| (nodes[at].id, object, data_type(&nodes[at], object))).collect();
-    let values = read_known(master, &items)?;
+    let values = reader.values(&items)?;
     for &at in others {
         let own = rows.iter().zip(&values).filter(|((of, ..), _)| *of == at);
         let found = own.flat_map(|((_, row, _), value)| {
@@ -350,7 +371,7 @@ fn find_objects<A: Ask>(master: &mut A, nodes: &mut [Node], others: &[usize]) ->
     Ok(())
 }
 
-fn read_units<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
+fn read_units<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     // Node, signal, and the objects with its unit, its digits and its step.
     let mut wanted: Vec<(usize, usize, [Option<ObjectId>; 3])> = Vec::new();
     for (at, node) in nodes.iter().enumerate() {
@@ -370,8 +391,7 @@ fn read_units<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
             (node.id, object, node.layout().data_type(object).unwrap_or(if object.index == 0x6131 { U32 } else { U8 }))
         })
         .collect();
-    let values: BTreeMap<(usize, ObjectId), Option<Value>> =
-        objects.into_iter().zip(read_known(master, &items)?).collect();
+    let values: BTreeMap<(usize, ObjectId), Option<Value>> = objects.into_iter().zip(reader.values(&items)?).collect();
     for (at, number, objects) in wanted {
         let [unit, digits, step] =
             objects.map(|object| object.and_then(|object| self::number(values.get(&(at, object))?.as_ref())));
@@ -442,11 +462,16 @@ fn read_each(
         Err(Error::Sdo(_)) => {}
         Err(error) => return Err(error),
     }
-    let requests = nodes.iter().map(|&node| Request::read(node, ObjectId::DEVICE_TYPE)).collect();
+    let objects = [ObjectId::DEVICE_TYPE, ObjectId::new(0x1018, 1)];
+    let asked: Vec<(NodeId, ObjectId)> = nodes.iter().flat_map(|&node| objects.map(|object| (node, object))).collect();
+    let answers = Reader::new(master).read(&asked)?;
     let mut results = Vec::new();
-    for (&node, answer) in nodes.iter().zip(master.transfer(requests, &mut |_| {})?) {
-        match answer {
-            Err(error) if matches!(error.failure, SdoFailure::NoAnswer { .. }) => results.push(Err(error)),
+    for (&node, answers) in nodes.iter().zip(answers.chunks(objects.len())) {
+        let is_silent = |error: &&SdoError| matches!(error.failure, SdoFailure::NoAnswer { .. });
+        let silent: Vec<&SdoError> =
+            answers.iter().filter_map(|answer| answer.as_ref().err().filter(is_silent)).collect();
+        match silent[..] {
+            [error, _] => results.push(Err(error.clone())),
             _ => results.extend(read_each(master, &[node], read)?),
         }
     }

@@ -25,6 +25,9 @@ pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
             "node {node}: {signal}: the value is at the end of its integer type and may be clipped; read 0x6130 or \
              0x9130 instead"
         ),
+        Doubt::UnknownStatus => {
+            format!("node {node}: {signal}: the status is unknown: no valid answer to the read of its object")
+        }
     }
 }
 

@@ -239,6 +239,7 @@ fn event(fact: &LssFact) -> NoteText {
             NoteText::new("standard-rate-table", "its own bit rate table is unknown; the table of CiA 305 is used")
         }
         LssEvent::Progress(done) => NoteText::new("progress", progress(done)),
+        LssEvent::OtherAnswer(reason) => NoteText::new("other-answer", reason.0.to_string()),
         LssEvent::RetryInStopped => NoteText::new("retry-in-stopped", "no LSS answer; tried again in STOPPED"),
         LssEvent::LeftPreOperational => {
             NoteText::new("left-pre-operational", "now in PRE-OPERATIONAL; its state before is unknown")

@@ -14,11 +14,12 @@ use crate::measure::expression::bind::AvailableSignals;
 use crate::measure::expression::evaluator::Evaluator;
 use crate::measure::expression::verdict::{MissingData, Outcome, Reason, Verdict};
 use crate::measure::sample::{Doubt, Sample, Source};
+use crate::node::read::Reader;
 use crate::node::survey::survey_each;
 use crate::node::{Node, Overrides};
 use crate::tasks::Failure;
 use crate::tasks::log::{self, LogEvent, Mode, Observer, RecordingReport, Remark, log};
-use crate::tasks::read::{ReadFailure, Target, requests, sample, targets};
+use crate::tasks::read::{ReadFailure, Target, objects, sample, targets};
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -136,7 +137,8 @@ fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<Chec
     evaluator.bind(&options.nodes, &available, options.skip_unsupported, &missing)?;
     let all = wanted_targets(&known, &evaluator)?;
     let sources: Vec<Source> = all.iter().map(|target| target.source.clone()).collect();
-    let mut answers = master.transfer(all.iter().flat_map(requests).collect(), &mut |_| {})?.into_iter();
+    let asked: Vec<_> = all.iter().flat_map(objects).collect();
+    let mut answers = Reader::new(master).read(&asked)?.into_iter();
     let mut samples: Vec<Sample> = Vec::new();
     let mut remarks = Vec::new();
     for target in &all {

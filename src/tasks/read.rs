@@ -9,12 +9,13 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{FitError, Note};
 use crate::canopen::value::{DataType, Value};
 use crate::device::unit::Unit;
-use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
+use crate::master::{Answer, Error, Master, SdoError, SdoFailure};
 use crate::measure::decode::{Reading, Wanted, source};
 use crate::measure::layout::Signal;
-use crate::measure::sample::{Number, Sample, Source};
+use crate::measure::sample::{Doubt, Number, Sample, Source, Status};
 use crate::node::Node;
 use crate::node::Overrides;
+use crate::node::read::Reader;
 use crate::node::survey::survey_each;
 use crate::tasks::Failure;
 
@@ -150,10 +151,11 @@ pub(super) fn find<'a>(node: &'a Node, name: &str) -> Result<&'a Signal, Failure
     })
 }
 
-/// The sample of a target from the answers to its [`requests`].
+/// The sample of a target from the answers to its [`objects`].
 ///
 /// # Errors
-/// The value could not be read. If the device rejects the status object, it has no status.
+/// The value could not be read. If the device rejects the status object, it has no status; without a valid answer, the
+/// status is unknown.
 pub fn sample(
     target: &Target,
     value: Result<Answer, SdoError>,
@@ -182,18 +184,28 @@ pub fn sample(
         return Err(SdoError { failure, ..not_a_number() });
     }
     let is_overload = target.reports_overload(status.as_ref());
-    let bits = match status.filter(|_| target.status.is_some()) {
-        None | Some(Err(SdoError { failure: SdoFailure::Refused(_), .. })) => None,
-        Some(Err(error)) => return Err(error),
-        Some(Ok(answer)) => {
-            let object = target.status.unwrap_or(target.object);
-            answer.value(node, object, Some(target.status_type))?.0.as_u64()
+    let second_type = if target.status.is_some() { target.status_type } else { U8 };
+    let second = status.zip(target.second_object()).map(|(result, object)| {
+        result.and_then(|answer| answer.value(node, object, Some(second_type))).map(|(value, _)| value.as_u64())
+    });
+    let (bits, is_unknown) = match second {
+        None => (None, target.second_object().is_some()),
+        Some(Err(SdoError { failure: SdoFailure::Refused(_), .. })) => (None, false),
+        Some(Err(error @ SdoError { failure: SdoFailure::TwoDevices(_) | SdoFailure::NotWritten(_), .. })) => {
+            return Err(error);
         }
+        Some(Err(_)) => (None, true),
+        Some(Ok(bits)) => (bits.filter(|_| target.status.is_some()), false),
     };
     let bytes = wire_bytes(&number, data_type);
     let mut sample = target.reading.sample(answer.at, &bytes, bits).ok_or_else(not_a_number)?;
     if is_overload {
         target.reading.report_overload(&mut sample, None);
+    }
+    if is_unknown {
+        // A marker in the value shows only an overload.
+        sample.status = sample.status.filter(|&status| status != Status::Ok);
+        sample.doubt = sample.doubt.or(Some(Doubt::UnknownStatus));
     }
     Ok(sample)
 }
@@ -211,10 +223,10 @@ fn wire_bytes(value: &Value, data_type: DataType) -> Vec<u8> {
     }
 }
 
-/// The requests for a target: value, and status or error register.
-pub fn requests(target: &Target) -> Vec<Request> {
-    let objects = [Some(target.object), target.second_object()];
-    objects.into_iter().flatten().map(|object| Request::read(target.source.node, object)).collect()
+/// The objects of a target: value, and status or error register.
+pub fn objects(target: &Target) -> impl Iterator<Item = (NodeId, ObjectId)> + use<> {
+    let node = target.source.node;
+    [Some(target.object), target.second_object()].into_iter().flatten().map(move |object| (node, object))
 }
 
 /// The values of one node.
@@ -233,12 +245,12 @@ pub fn read(
     master.listen_to(nodes)?;
     let planned: Vec<Result<Vec<Target>, Failure>> =
         survey_each(master, nodes, overrides)?.into_iter().map(|node| targets(&node?, wanted, &mut 0)).collect();
-    let asked = planned.iter().flatten().flatten().flat_map(requests).collect();
-    let mut answers = master.transfer(asked, &mut |_| {})?.into_iter();
+    let asked: Vec<_> = planned.iter().flatten().flatten().flat_map(objects).collect();
+    let mut answers = Reader::new(master).read(&asked)?.into_iter();
     Ok(planned.into_iter().map(|targets| readings(targets?, &mut answers)).collect())
 }
 
-/// The samples of one node from the answers to its [`requests`]. Uses up all answers of the node, even after an error,
+/// The samples of one node from the answers to its [`objects`]. Uses up all answers of the node, even after an error,
 /// because the answers of the next node follow.
 fn readings(
     targets: Vec<Target>,

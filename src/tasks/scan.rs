@@ -4,6 +4,7 @@ mod failure;
 
 pub use failure::ScanFailure;
 
+use crate::bus::Filters;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
 use crate::master::{Error, Master};
@@ -28,6 +29,12 @@ pub struct Found {
     pub failure: Option<Failure>,
 }
 
+impl Found {
+    fn new(node: NodeId, state: Option<NmtState>) -> Found {
+        Found { node, state, device: Node::new(node), is_other_device: false, failure: None }
+    }
+}
+
 /// Reads the device type of every node in parallel, then the identity of those that answer.
 ///
 /// Heartbeats and boot-up messages also show nodes, for example stopped ones that cannot answer. Nodes without an
@@ -42,10 +49,19 @@ pub fn scan(
     rounds: u32,
     overrides: &Overrides,
 ) -> Result<Vec<Found>, Error> {
-    master.listen_to(nodes)?;
+    // The only node may answer with another COB-ID.
+    if nodes.len() == 1 {
+        master.listen(&Filters::All)?
+    } else {
+        master.listen_to(nodes)?
+    }
     let presence = scan::find(master, nodes, timeout, rounds)?;
     let answering: Vec<NodeId> = nodes.iter().copied().filter(|node| presence.answered.contains(node)).collect();
+    master.listen_to(nodes)?;
     let mut found = found(&presence, nodes);
+    if let (Some(error), []) = (&presence.other_channel, &found[..]) {
+        found.push(Found { failure: Some(error.clone().into()), ..Found::new(error.node, None) });
+    }
     for (node, result) in answering.iter().zip(identify_each(master, &answering, overrides)?) {
         let Some(entry) = found.iter_mut().find(|entry| entry.node == *node) else { continue };
         match result {
@@ -55,6 +71,13 @@ pub fn scan(
             }
             Err(error) => entry.failure = Some(error.into()),
         }
+    }
+    // Heartbeats also arrive while the identities are read.
+    found.iter_mut().for_each(|found| found.state = found.state.or(master.last_state(found.node)));
+    // A file that is for another device is not used.
+    let others: Vec<NodeId> = found.iter().filter(|found| found.is_other_device).map(|found| found.node).collect();
+    for node in identify_each(master, &others, &Overrides::new())?.into_iter().flatten() {
+        found.iter_mut().filter(|entry| entry.node == node.id).for_each(|entry| entry.device = node.clone());
     }
     Ok(found)
 }
@@ -82,12 +105,6 @@ pub fn listen(
 
 /// The requested nodes with a sign of life, in ascending order.
 fn found(presence: &Presence, nodes: &[NodeId]) -> Vec<Found> {
-    let of_node = |node| Found {
-        node,
-        state: presence.state(node),
-        device: Node::new(node),
-        is_other_device: false,
-        failure: None,
-    };
+    let of_node = |node| Found::new(node, presence.state(node));
     presence.nodes().into_iter().filter(|node| nodes.contains(node)).map(of_node).collect()
 }

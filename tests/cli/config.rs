@@ -44,6 +44,18 @@ offset = "0.000 psi"
 "#;
 
 #[test]
+fn two_devices_with_one_node_id_get_no_settings() {
+    let bench = Bench::described(
+        "[[device]]\nkind = \"dps\"\nnode = 5\nserial = 1\nduplicate_id = true\n\
+         [[device]]\nkind = \"dps\"\nnode = 5\nserial = 2\nduplicate_id = true\n",
+    );
+    std::fs::write(bench.path("c.toml"), "[node]\nheartbeat = \"500ms\"\n").expect("written");
+    let done = bench.run("config apply 5 c.toml").exit(1);
+    assert!(done.stderr.contains("nothing was written"), "{}", done.stderr);
+    assert!(done.frames_of("605").iter().all(|data| data.starts_with("40")), "{:?}", done.frames);
+}
+
+#[test]
 fn a_dump_has_every_setting_of_the_device_and_no_other() {
     let bench = Bench::of(ALL);
     bench.run("config dump 127").prints(DPS);

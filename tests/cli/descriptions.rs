@@ -85,6 +85,19 @@ fn eds_for_all_nodes_applies_to_matching_nodes() {
 }
 
 #[test]
+fn a_device_keeps_its_name_if_the_eds_is_for_another_one() {
+    for kind in ["mc1609", "mh4", "dps"] {
+        let bench = bench_with(&format!("{kind}@3"), &[("other.eds", eds(0x56, 0x41, &NAMES))]);
+        for line in ["--eds other.eds scan", "--eds other.eds scan 3", "--eds 3=other.eds scan 3"] {
+            let found = bench.run(&format!("{line} --format json")).exit(0).json();
+            assert_eq!(found[0]["device"], kind, "{line}");
+        }
+        let title = |line: &str| bench.run(line).exit(0).stdout.lines().next().map(str::to_owned);
+        assert_eq!(title("--eds other.eds info 3"), title("info 3"));
+    }
+}
+
+#[test]
 fn values_and_vendor_come_from_the_device() {
     let other = eds(0x56, 0x41, &[(0x6130, "Value", 4), (0x2200, "Offset", 8)]).replace("[6130]", "[6130sub1]");
     let bench = bench_with("mh4@1", &[("other.eds", other)]);

@@ -1,5 +1,6 @@
 //! Answers of the wrong length, and more than one answer to a request.
 
+use super::Kept;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
@@ -7,14 +8,65 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::{DownloadSize, Note, Violation};
 use cangauge::canopen::value::{DataType, Value};
-use cangauge::master::{Answer, Blocks, Error, Master, OnTwoDevices, Request, SdoError, SdoFailure, Timing};
-use cangauge::node::survey::identify;
+use cangauge::device::catalog::by_name;
+use cangauge::master::{Answer, Blocks, Error, Master, OnTwoDevices, Operation, Request, SdoError, SdoFailure, Timing};
+use cangauge::measure::sample::Doubt;
+use cangauge::node::survey::{identify, survey_each};
 use cangauge::node::{self, Node, Overrides, write};
+use cangauge::sim::{Device, Setup};
+use cangauge::tasks::log::{LogOptions, Mode, log};
+use cangauge::tasks::read::{Readings, read as read_signals};
+use cangauge::tasks::{Failure, Kind};
 use std::time::Duration;
 
 const NAME: ObjectId = ObjectId::new(0x1008, 0);
 const SERIAL: ObjectId = ObjectId::new(0x1018, 4);
 const HEARTBEAT: ObjectId = ObjectId::new(0x1017, 0);
+
+/// A device that does not answer the requests for some objects.
+pub(super) struct Mute {
+    device: Device,
+    silent: Vec<u16>,
+}
+
+impl Mute {
+    pub(super) fn new(kind: &str, silent: &[u16]) -> Mute {
+        let device = Device::new(Setup::new(by_name(kind).expect("a kind"), node())).expect("a device");
+        Mute { device, silent: silent.to_vec() }
+    }
+}
+
+impl Station for Mute {
+    fn power_on(&mut self, now: Mono, out: &mut Outbox) {
+        self.device.power_on(now, out);
+    }
+
+    fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        match *frame.data() {
+            [0x40, low, high, ..] if self.silent.contains(&u16::from_le_bytes([low, high])) => {}
+            _ => self.device.receive(now, frame, out),
+        }
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        self.device.wake(now, out);
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.device.next_wake()
+    }
+
+    fn sent(&mut self, now: Mono, frame: &Frame) {
+        self.device.sent(now, frame);
+    }
+}
+
+/// Runs `work` with a device that does not answer for some objects.
+fn with_mute<T>(kind: &str, silent: &[u16], work: impl FnOnce(&mut Master<'_>) -> T) -> T {
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
+    bus.attach(Mute::new(kind, silent));
+    work(&mut Master::new(&mut bus, Timing::default()))
+}
 
 /// What follows one request: the start of the request, and the answers to it.
 type Step = (&'static str, &'static [&'static str]);
@@ -220,6 +272,92 @@ fn identity_with(odd: &[Step]) -> Result<Vec<Node>, Error> {
     let is_odd = |step: &&Step| odd.iter().any(|(request, _)| *request == step.0);
     let steps: Vec<Step> = odd.iter().chain(steps.iter().filter(|step| !is_odd(step))).copied().collect();
     with(&steps, |master| identify(master, &[node()], &Overrides::new()))
+}
+
+#[test]
+fn silent_object_stops_no_survey() {
+    for silent in [
+        &[0x1000][..],
+        &[0x1017, 0x1014, 0x1005, 0x1019],
+        &[0x6131],
+        &[0x6131, 0x6132],
+        &[0x1801, 0x1802, 0x1803, 0x1804],
+        &[0x1A00],
+    ] {
+        for kind in ["mh4", "dps"] {
+            let (node, unknown) = with_mute(kind, silent, |master| {
+                let surveyed = survey_each(master, &[node()], &Overrides::new()).expect("the bus works").remove(0);
+                (surveyed.unwrap_or_else(|error| panic!("{kind} {silent:x?}: {error}")), master.unknown_objects())
+            });
+            assert!(!node.signals.is_empty(), "{kind} {silent:x?}");
+            let unknown: Vec<ObjectId> = unknown.into_values().flatten().collect();
+            assert!(unknown.iter().all(|object| silent.contains(&object.index)), "{kind} {silent:x?}");
+            assert_eq!(unknown.is_empty(), kind == "dps" && silent[0] == 0x1801, "{kind} {silent:x?}");
+        }
+    }
+}
+
+#[test]
+fn node_that_answers_only_its_device_type_is_given_up_soon() {
+    let silent: Vec<u16> = (0x1001..=0x9fff).collect();
+    with_mute("mh4", &silent, |master| {
+        let error = survey_each(master, &[node()], &Overrides::new()).expect("the bus works").remove(0);
+        assert!(matches!(error, Err(SdoError { failure: SdoFailure::NoAnswer { .. }, .. })), "{error:?}");
+        assert!(master.now().since_start() < Duration::from_secs(10), "{:?}", master.now().since_start());
+    });
+}
+
+/// The readings of an MH-4.
+fn readings(kind: &str, silent: &[u16]) -> Result<Readings, Failure> {
+    with_mute(kind, silent, |master| {
+        read_signals(master, &[node()], &[], &Overrides::new()).expect("the bus works").remove(0)
+    })
+}
+
+#[test]
+fn silent_status_object_is_an_unknown_status() {
+    let readings_of = |kind, silent| readings(kind, silent).expect("the values answer");
+    for (kind, silent) in [("mh4", &[0x6150][..]), ("dps", &[0x1001])] {
+        let (_, sample) = &readings_of(kind, silent)[0];
+        assert_eq!((sample.value.is_some(), sample.status), (true, None), "{kind}");
+        assert_eq!(sample.doubt, Some(Doubt::UnknownStatus), "{kind}");
+        assert_eq!(readings_of(kind, &[])[0].1.doubt, None, "{kind}");
+    }
+    let (_, sample) = &readings_of("dps", &[0x6132])[0];
+    assert_eq!((sample.value.is_some(), sample.doubt), (true, Some(Doubt::UnknownDigits)));
+    assert_eq!(readings("mh4", &[0x6130]).expect_err("the value does not answer").kind(), Kind::NoAnswer);
+}
+
+#[test]
+fn silent_status_object_does_not_slow_polling_down() {
+    with_mute("mh4", &[0x6150], |master| {
+        let options = LogOptions {
+            nodes: vec![node()],
+            wanted: Vec::new(),
+            mode: Mode::Poll(Duration::from_millis(100)),
+            duration: Some(Duration::from_secs(5)),
+            count: None,
+            nmt: true,
+            max_gap: None,
+            overrides: Overrides::new(),
+        };
+        let report = log(master, &options, &mut Kept::default()).expect("the values answer");
+        assert!(report.rows > 30, "{}", report.rows);
+    });
+}
+
+#[test]
+fn error_of_two_devices_names_the_request_with_two_answers() {
+    let steps: [Step; 2] = [("605#40181004", TWO_SERIALS), ("605#401710", &["585#4B171000F4010000"])];
+    for request in
+        [Request::read(node(), HEARTBEAT), Request::write(node(), HEARTBEAT, vec![1, 0], DownloadSize::Indicated)]
+    {
+        with(&steps, |master| {
+            master.transfer_one(Request::read(node(), SERIAL)).expect("the bus works").expect_err("two devices");
+            let error = master.transfer_one(request).expect("the bus works").expect_err("two devices");
+            assert_eq!((error.object, error.operation), (SERIAL, Operation::Read));
+        });
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The duration of a scan, and the nodes that it finds.
 
+use super::odd_answers::Mute;
 use cangauge::bus::Bus;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
@@ -7,7 +8,8 @@ use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::nmt::NmtState;
 use cangauge::device::catalog::by_name;
-use cangauge::master::{Master, Timing};
+use cangauge::master::{Master, OnTwoDevices, Timing};
+use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, Setup};
 use cangauge::tasks::scan::{Found, scan};
 use std::path::Path;
@@ -50,6 +52,67 @@ fn state_comes_from_the_heartbeat() {
     let (found, took) = scanned(&mut bus, &ids([5]), WAIT);
     assert_eq!(found[0].state, Some(NmtState::PreOperational));
     assert!(took < Duration::from_millis(300), "{took:?}");
+}
+
+#[test]
+fn node_without_answer_for_1000h_is_found() {
+    for nodes in [ids([5]), ids(1..=127)] {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Mute::new("mh4", &[0x1000]));
+        let (found, _) = scanned(&mut bus, &nodes, WAIT);
+        let names: Vec<_> = found.iter().map(|found| found.device.identity.name.as_deref()).collect();
+        assert_eq!(names, [Some("MH-4-CAN")]);
+        assert_eq!((found[0].device.identity.device_type, &found[0].failure), (None, &None));
+    }
+}
+
+/// A server that answers each read with these frames: COB-ID and value.
+struct Answering(&'static [(u16, u8)]);
+
+impl Station for Answering {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        let [0x40, a, b, c, ..] = *frame.data() else { return };
+        if frame.id().number() != 0x605 {
+            return;
+        }
+        for (id, value) in self.0 {
+            out.send(format!("{id:03X}#43{a:02X}{b:02X}{c:02X}{value:02X}010200").parse().expect("a frame"));
+        }
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn answer_with_another_cob_id_is_reported_with_the_channel() {
+    for (cob_id, channel) in [(0x5c5, "--sdo 5=0x605:0x5C5"), (0x6e5, "--sdo 5=0x605:0x6E5")] {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Answering(Box::leak(Box::new([(cob_id, 0x94)]))));
+        let (found, _) = scanned(&mut bus, &ids([5]), WAIT);
+        let failure = found[0].failure.as_ref().expect("no answer with its own COB-ID");
+        let text = ErrorMessage::from(failure);
+        assert!(text.hint.is_some_and(|hint| hint.contains(channel)), "{}", text.message);
+        assert!(text.message.contains(&format!("heard {cob_id:03X}#43")), "{}", text.message);
+    }
+}
+
+#[test]
+fn two_devices_are_one_row_without_a_failure() {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(Answering(&[(0x585, 0x94), (0x585, 0x96)]));
+    let mut master = Master::new(&mut bus, Timing::default());
+    master.set_on_two_devices(OnTwoDevices::Report);
+    let found = scan(&mut master, &ids([5]), WAIT, 2, &Default::default()).unwrap();
+    assert_eq!((found.len(), found[0].failure.as_ref()), (1, None));
+    assert!(matches!(master.second_answers()[..], [(_, answers)] if answers.differs()));
 }
 
 /// A device that is switched on later than the others.

@@ -18,8 +18,8 @@ pub struct BackgroundSurvey {
     overrides: Overrides,
     answers: BTreeMap<ObjectId, Result<Answer, SdoError>>,
     pending: BTreeMap<Ticket, ObjectId>,
-    /// Whether the latest object was not answered.
-    is_silent: bool,
+    /// The number of the latest objects without an answer, one after the other.
+    silent: u8,
 }
 
 /// Why a run of the survey stopped.
@@ -57,6 +57,14 @@ impl Ask for Known<'_, '_> {
     fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]) {
         self.master.set_quirks(node, quirks);
     }
+
+    fn tolerates_two_devices(&self) -> bool {
+        self.master.tolerates_two_devices()
+    }
+
+    fn add_unknown(&mut self, node: NodeId, object: ObjectId) {
+        self.master.add_unknown(node, object);
+    }
 }
 
 impl BackgroundSurvey {
@@ -65,7 +73,7 @@ impl BackgroundSurvey {
         let own = overrides.iter().filter(|(other, _)| **other == node);
         let overrides = own.map(|(&node, model)| (node, model.clone())).collect();
         let mut survey =
-            BackgroundSurvey { node, overrides, answers: BTreeMap::new(), pending: BTreeMap::new(), is_silent: false };
+            BackgroundSurvey { node, overrides, answers: BTreeMap::new(), pending: BTreeMap::new(), silent: 0 };
         // The first run has no answers: it only sends requests.
         let _ = survey.run(master);
         survey
@@ -81,11 +89,14 @@ impl BackgroundSurvey {
     ) -> Option<Result<Node, Error>> {
         let object = self.pending.remove(&ticket)?;
         let error = result.as_ref().err().filter(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }));
-        let was_silent = std::mem::replace(&mut self.is_silent, error.is_some());
+        self.silent = if error.is_some() { self.silent + 1 } else { 0 };
         if let Some(error) = error {
-            // The other objects are requested again, unless the node is silent twice in a row.
+            // The other objects are requested again. After two silent objects in a row, the node must answer an object
+            // that it answered before: its answer is forgotten, so the next run requests it.
             master.forget(std::mem::take(&mut self.pending).into_keys());
-            if was_silent {
+            let answered = self.answers.iter().find(|(_, answer)| answer.is_ok()).map(|(&object, _)| object);
+            let is_known = self.silent > 1 && answered.is_some_and(|object| self.answers.remove(&object).is_some());
+            if self.silent > 2 || self.silent > 1 && !is_known {
                 return Some(Err(Error::Sdo(error.clone())));
             }
         }

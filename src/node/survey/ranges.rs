@@ -7,23 +7,23 @@ use crate::master::{Error, Master};
 use crate::measure::layout::{MeasuringRange, NarrowValue, Scaling, Signal};
 use crate::measure::sample::Number;
 use crate::node::Node;
-use crate::node::read::{Item, read_known, read_optional};
+use crate::node::read::{Item, Reader};
 
 /// Reads the measuring ranges (6148h, 6149h) if a value depends on them. This is an integer that may be too narrow, or
 /// a described signal without a status. A device with integers may have these objects as integers only (7148h to 9149h).
-pub(super) fn read_ranges<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
-    read_family(master, nodes, 0x6000, |_| true)?;
+pub(super) fn read_ranges<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
+    read_family(reader, nodes, 0x6000, |_| true)?;
     for family in [0x9000, 0x8000, 0x7000] {
         let is_missing =
             |signal: &Signal| signal.range == MeasuringRange::Unknown && signal.value_object.0.index >= 0x7000;
-        read_family(master, nodes, family, is_missing)?;
+        read_family(reader, nodes, family, is_missing)?;
     }
     Ok(())
 }
 
 /// Reads the measuring ranges of some signals from the objects of a family (6xxxh to 9xxxh).
 fn read_family<A: Ask>(
-    master: &mut A,
+    reader: &mut Reader<'_, A>,
     nodes: &mut [Node],
     family: u16,
     is_meant: impl Fn(&Signal) -> bool,
@@ -57,7 +57,7 @@ fn read_family<A: Ask>(
             objects.map(|(object, data_type)| (node, object, data_type))
         })
         .collect();
-    let values = read_known(master, &items)?;
+    let values = reader.values(&items)?;
     for (&(at, number, _), ends) in wanted.iter().zip(values.chunks(2)) {
         let signal = &mut nodes[at].signals[number];
         let digits = signal.digits.unwrap_or(0);
@@ -97,17 +97,17 @@ fn is_narrow(data_type: Option<DataType>) -> bool {
 pub fn narrow_values(master: &mut Master<'_>, node: &mut Node) -> Result<Vec<NarrowValue>, Error> {
     let is_narrow = |signal: &Signal| has_narrow_entry(node, signal);
     if node.signals.iter().any(is_narrow) {
-        read_ranges(master, std::slice::from_mut(node))?;
+        read_ranges(&mut Reader::new(master), std::slice::from_mut(node))?;
     }
     Ok(node.layout().narrow_values())
 }
 
 /// Reads the error registers (1001h) that report overloads.
-pub(super) fn read_overloads<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
+pub(super) fn read_overloads<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let wanted: Vec<(usize, u8)> =
         nodes.iter().enumerate().filter_map(|(at, node)| Some((at, node.overload_register()?))).collect();
     let items: Vec<Item> = wanted.iter().map(|&(at, _)| (nodes[at].id, Node::ERROR_REGISTER, U8)).collect();
-    for (&(at, mask), register) in wanted.iter().zip(read_optional(master, &items)?) {
+    for (&(at, mask), register) in wanted.iter().zip(reader.values(&items)?) {
         nodes[at].has_overload = unsigned::<u8>(register.as_ref()).is_some_and(|bits| bits & mask == mask);
     }
     Ok(())

@@ -3,9 +3,10 @@
 use super::{Place, Words};
 use crate::bus::replay::{FileFormat, RecordingError};
 use crate::bus::time::format_duration;
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss::Service;
 use crate::canopen::nmt::NmtState;
+use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::Violation;
 use crate::tasks::failure::{
     BusError, ExpressionError, LssError, MissedAnswer, Operation, SdoError, SdoFailure, SecondAnswer,
@@ -145,18 +146,29 @@ pub fn second_answer(node: NodeId, answers: SecondAnswer) -> String {
     format!("node {node}: answers arrive twice: two devices have node-ID {node}, or a bridge repeats frames")
 }
 
+/// Optional objects of a node have no valid answer.
+pub fn unknown_objects(node: NodeId, objects: &[ObjectId]) -> String {
+    let objects: Vec<String> = objects.iter().map(ObjectId::to_string).collect();
+    format!("node {node}: unknown objects (no valid answer): {}", objects.join(", "))
+}
+
 /// The hint for a node that does not answer.
 fn silence_advice(node: NodeId, waited: Duration, started: bool, missed: MissedAnswer) -> Option<String> {
     if let Some(frame) = missed.frame {
-        let channel = frame.id().sdo_response_node();
-        return (channel.is_none())
-            .then(|| format!("if it answers with another COB-ID, add: --sdo {node}=0xTX:0x{}", frame.id()));
+        return (frame.id() != CanId::sdo_response(node)).then(|| {
+            format!(
+                "if it answers with another COB-ID, add: --sdo {node}=0x{}:0x{}",
+                CanId::sdo_request(node),
+                frame.id()
+            )
+        });
     }
     Some(match missed.state {
         Some(NmtState::Stopped) => format!("a stopped node does not answer SDO: cangauge nmt preop {node}"),
         _ if missed.has_answered || started => {
             format!(
-                "the node answered before: allow it more time with -t {}",
+                "the node answered before; find the cause: cangauge doctor {node}; if it is only slow, allow more time: \
+                 -t {}",
                 format_duration(waited * 4).replace(' ', "")
             )
         }

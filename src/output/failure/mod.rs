@@ -19,7 +19,7 @@ mod scan;
 pub(super) mod settings;
 pub(super) mod store;
 
-pub use below::second_answer;
+pub use below::{second_answer, unknown_objects};
 
 use super::json;
 use super::notes::{NoteText, effect};

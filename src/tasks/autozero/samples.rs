@@ -3,14 +3,14 @@
 use crate::bus::Received;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::Life;
-use crate::master::{Error, Happening, Master};
+use crate::master::{Error, Happening, Master, Request};
 use crate::measure::decode::Wanted;
-use crate::measure::sample::Status;
+use crate::measure::sample::{Doubt, Status};
 use crate::measure::statistics::Statistics;
 use crate::node::Node;
 use crate::node::wait::{Policy, wait};
 use crate::tasks::Failure;
-use crate::tasks::read::{Target, requests, sample, targets};
+use crate::tasks::read::{Target, objects, sample, targets};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -55,11 +55,16 @@ impl Samples {
 
     fn read(&mut self, master: &mut Master<'_>, target: &Target) -> Result<(), Failure> {
         let node = target.source.node;
-        let mut answers = master.transfer(requests(target), &mut |received| self.watch(node, received))?.into_iter();
+        let requests = objects(target).map(|(node, object)| Request::read(node, object)).collect();
+        let mut answers = master.transfer(requests, &mut |received| self.watch(node, received))?.into_iter();
         let Some(value) = answers.next() else { return Ok(()) };
         let status = answers.next();
         let is_reported = target.reports_overload(status.as_ref());
+        let failed = status.as_ref().and_then(|status| status.as_ref().err()).cloned();
         let sample = sample(target, value, status)?;
+        if let Some(error) = failed.filter(|_| sample.doubt == Some(Doubt::UnknownStatus)) {
+            return Err(error.into());
+        }
         // An overload computed only from the measuring range is ignored, because a large zero error looks the same.
         let is_from_span = target.status.is_none() && sample.value.is_some() && !is_reported;
         let from_span = |status: Status| is_from_span && status.is_overload();

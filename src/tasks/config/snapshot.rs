@@ -7,8 +7,9 @@ use crate::canopen::pdo::{CobId, TpdoNumber};
 use crate::canopen::sdo::AbortCode;
 use crate::canopen::value::DataType;
 use crate::device::config_file::Item;
-use crate::master::{Master, Request, SdoError, SdoFailure};
+use crate::master::{Master, SdoError, SdoFailure};
 use crate::node::Node;
+use crate::node::read::Reader;
 use crate::tasks::Failure;
 use crate::tasks::pdo;
 use std::collections::BTreeMap;
@@ -173,12 +174,12 @@ fn extra_objects(node: &Node) -> Vec<(ObjectId, DataType)> {
     objects.into_iter().map(|object| (object, node.data_type(object))).collect()
 }
 
-/// The bytes of objects, and those that could not be read.
+/// The bytes of objects, and those that the device refuses.
 type Values = (BTreeMap<ObjectId, Vec<u8>>, Vec<(ObjectId, AbortCode)>);
 
 fn read_objects(master: &mut Master<'_>, node: &Node, objects: &[(ObjectId, DataType)]) -> Result<Values, Failure> {
-    let requests = objects.iter().map(|&(object, _)| Request::read(node.id, object)).collect();
-    let answers = master.transfer(requests, &mut |_| {})?;
+    let asked: Vec<_> = objects.iter().map(|&(object, _)| (node.id, object)).collect();
+    let answers = Reader::new(master).read_optional(&asked)?;
     let (mut values, mut unreadable) = (BTreeMap::new(), Vec::new());
     for (&(object, data_type), answer) in objects.iter().zip(answers) {
         let checked = answer.map(|answer| {
@@ -199,7 +200,8 @@ fn read_objects(master: &mut Master<'_>, node: &Node, objects: &[(ObjectId, Data
             }
             Err(SdoError { failure: SdoFailure::Refused(AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX), .. }) => {}
             Err(SdoError { failure: SdoFailure::Refused(code), .. }) => unreadable.push((object, code)),
-            Err(error) => return Err(error.into()),
+            // An object without a valid answer is noted at the end of the command.
+            Err(_) => {}
         }
     }
     Ok((values, unreadable))

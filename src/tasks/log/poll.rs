@@ -4,12 +4,12 @@ use super::nth;
 use super::silence::Silent;
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
-use crate::master::{Answer, Master, SdoError, Ticket};
+use crate::master::{Answer, Master, Request, SdoError, Ticket};
 use crate::measure::decode::{Decoder, Wanted};
-use crate::measure::sample::Sample;
+use crate::measure::sample::{Doubt, Sample};
 use crate::node::Node;
 use crate::tasks::Failure;
-use crate::tasks::read::{Target, requests, sample, targets};
+use crate::tasks::read::{Target, objects, sample, targets};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -24,6 +24,9 @@ pub(super) struct Poll {
     answers: Vec<Parts>,
     /// The last answer of each target, if it was an error.
     errors: Vec<Option<SdoError>>,
+    /// Whether a status of each target was received; `None` before the first answer. A status object that does not answer
+    /// the first request is not requested again.
+    has_status: Vec<Option<bool>>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -55,6 +58,7 @@ impl Poll {
             open: BTreeMap::new(),
             answers: Vec::new(),
             errors: Vec::new(),
+            has_status: Vec::new(),
         };
         for node in nodes {
             poll.set_node(node, wanted, decoder)?;
@@ -85,12 +89,16 @@ impl Poll {
                 !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == node.id
             };
             match (0..self.targets.len()).find(is_free) {
-                Some(at) => (self.targets[at], self.live[at], self.errors[at]) = (target, true, None),
+                Some(at) => {
+                    (self.targets[at], self.live[at], self.errors[at]) = (target, true, None);
+                    self.has_status[at] = None;
+                }
                 None => {
                     self.targets.push(target);
                     self.live.push(true);
                     self.answers.push(Parts::default());
                     self.errors.push(None);
+                    self.has_status.push(None);
                 }
             }
         }
@@ -164,8 +172,10 @@ impl Poll {
             }
             parts.cycle = cycle;
             // The value is requested last, because its answer completes the sample. So rows are in order of time.
-            for (request, part) in requests(target).into_iter().zip([Part::Value, Part::Status]).rev() {
-                self.open.insert(master.start(request), (at, part));
+            let parts_asked = if self.has_status[at] == Some(false) { 1 } else { 2 };
+            let asked: Vec<_> = objects(target).zip([Part::Value, Part::Status]).take(parts_asked).collect();
+            for ((node, object), part) in asked.into_iter().rev() {
+                self.open.insert(master.start(Request::read(node, object)), (at, part));
                 parts.under_way += 1;
             }
         }
@@ -198,6 +208,7 @@ impl Poll {
         match sample(target, parts.value?, parts.status) {
             Ok(mut sample) => {
                 decoder.report_overloads(target.source.node, &target.reading, &mut sample);
+                self.has_status[at].get_or_insert(sample.doubt != Some(Doubt::UnknownStatus));
                 samples.push(sample);
                 self.errors[at] = None;
                 None

@@ -30,6 +30,8 @@ pub enum LssEvent {
     StandardRateTable,
     /// The completed steps of the change.
     Progress(Progress),
+    /// A service was answered with another specifier.
+    OtherAnswer(Reason),
     /// The device does not answer LSS; the request is repeated in STOPPED.
     RetryInStopped,
     /// The device is in PRE-OPERATIONAL; its previous state is unknown.
@@ -86,7 +88,8 @@ impl LssEvent {
             | LssEvent::LeftPreOperational
             | LssEvent::ChangingRate { .. }
             | LssEvent::AnswersAt { .. } => false,
-            LssEvent::ObjectsInsteadOfLss
+            LssEvent::OtherAnswer(_)
+            | LssEvent::ObjectsInsteadOfLss
             | LssEvent::UnverifiedMethod { .. }
             | LssEvent::StoreResetsCobIds
             | LssEvent::SharedNodeId(_)

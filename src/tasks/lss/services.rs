@@ -1,6 +1,7 @@
 //! Single LSS services: inquire, activate, store.
 
 use super::device::{Descriptions, LssDevice};
+use super::event::{LssEvent, Reason};
 use super::failure::LssCause;
 use super::method::choose_method;
 use super::resolve::resolve;
@@ -10,6 +11,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::lss::{LssAddress, Mode};
 use crate::master::{Lss, LssError, Master};
 use crate::tasks::{Effect, Failure};
+use std::sync::Arc;
 
 /// The identity and node-ID that a slave reports.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,21 +35,29 @@ pub fn inquire(
     notify: Notify<'_>,
 ) -> Result<Inquired, Failure> {
     let device = resolve(master, target, descriptions, (Via::Lss, false), notify)?;
+    let mut others = Vec::new();
     let (address, node) = with_device(master, &device, notify, |lss| {
-        let address = unless_silent(lss.inquire_address())?;
-        let node = unless_silent(lss.inquire_node_id())?;
+        let address = unless_silent(lss.inquire_address(), &mut others)?;
+        let node = unless_silent(lss.inquire_node_id(), &mut others)?;
         Ok((address, node.and_then(|gathered| gathered.answers.first().copied())))
     })?;
+    for error in others {
+        notify(device.note(LssEvent::OtherAnswer(Reason(Arc::new(error)))));
+    }
     if address.is_none() && node.is_none() {
         return Err(device.failure(LssCause::NoInquiry));
     }
     Ok(Inquired { target: target.clone(), address, node })
 }
 
-fn unless_silent<T>(result: Result<T, LssError>) -> Result<Option<T>, LssError> {
+/// The answer; `None` if there is none. An error that names another frame is added to `others`.
+fn unless_silent<T>(result: Result<T, LssError>, others: &mut Vec<LssError>) -> Result<Option<T>, LssError> {
     match result {
         Ok(answer) => Ok(Some(answer)),
-        Err(LssError::NoAnswer { .. }) => Ok(None),
+        Err(error @ LssError::NoAnswer { heard, .. }) => {
+            others.extend(heard.map(|_| error));
+            Ok(None)
+        }
         Err(error) => Err(error),
     }
 }

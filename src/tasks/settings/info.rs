@@ -8,15 +8,15 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::device::profiles;
 use crate::device::unit::Unit;
-use crate::master::Master;
+use crate::master::{Master, SdoFailure};
 use crate::measure::layout::Signal;
 use crate::measure::sample::Sample;
 use crate::node::Node;
-use crate::node::read::read_optional;
+use crate::node::read::Reader;
 use crate::node::state;
+use crate::tasks::Failure;
 use crate::tasks::failure::Cause;
-use crate::tasks::read::{requests, sample, targets};
-use crate::tasks::{Failure, Kind};
+use crate::tasks::read::{objects, sample, targets};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -183,7 +183,7 @@ impl Selection {
             .collect();
         let all: Vec<ObjectId> = all.into_iter().collect();
         let items: Vec<_> = all.iter().map(|&object| (node.id, object, node.data_type(object))).collect();
-        let values = read_optional(master, &items)?;
+        let values = Reader::new(master).values(&items)?;
         Ok(all.into_iter().zip(values).filter_map(|(object, value)| Some((object, value?))).collect())
     }
 }
@@ -311,24 +311,26 @@ fn span(node: &Node, signal: &Signal) -> [ObjectId; 2] {
     [start, end]
 }
 
-/// The present values. A value is `None` if the device rejects the request.
+/// The present values. A value is `None` if it cannot be read.
 fn samples(master: &mut Master<'_>, node: &Node) -> Result<Vec<Option<Sample>>, Failure> {
     if node.signals.is_empty() {
         return Ok(Vec::new());
     }
     let targets = targets(node, &[], &mut 0)?;
-    let asked = targets.iter().flat_map(requests).collect();
-    let mut answers = master.transfer(asked, &mut |_| {})?.into_iter();
+    let asked: Vec<_> = targets.iter().flat_map(objects).collect();
+    let mut answers = Reader::new(master).read(&asked)?.into_iter();
     let mut samples = Vec::new();
     for target in targets {
         let Some(value) = answers.next() else { break };
-        let status = if target.status.is_some() { answers.next() } else { None };
+        let status = target.second_object().and_then(|_| answers.next());
         samples.push(match sample(&target, value, status) {
             Ok(sample) => Some(sample),
-            Err(error) => match Failure::from(error) {
-                failure if failure.kind() == Kind::NoAnswer => return Err(failure),
-                _ => None,
-            },
+            Err(error) => {
+                if matches!(error.failure, SdoFailure::NoAnswer { .. }) {
+                    master.add_unknown(node.id, error.object);
+                }
+                None
+            }
         });
     }
     Ok(samples)

@@ -98,7 +98,7 @@ pub fn select_signals(node: &Node, text: &str, is_selected: impl Fn(&Signal) -> 
     Ok(names)
 }
 
-/// Reads objects. A value is `None` if the node rejects the request or the bytes do not fit the type.
+/// Reads objects that must answer. A value is `None` if the node rejects the request or the bytes do not fit the type.
 fn read_each(master: &mut Master<'_>, node: &Node, objects: &[ObjectId]) -> Result<Vec<Option<Value>>, Failure> {
     let items: Vec<_> = objects.iter().map(|&object| (node.id, object, node.data_type(object))).collect();
     let value = |result: Result<Value, SdoError>| match result {

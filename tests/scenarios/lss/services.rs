@@ -10,7 +10,10 @@ use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::lss::{ErrorCode, LssRange, Mode, Part, Service, Violation};
 use cangauge::master::lss::{Gathered, Others};
 use cangauge::master::{Error, Lss, LssError, Master, Timing};
+use cangauge::node::Overrides;
+use cangauge::tasks::Note;
 use cangauge::tasks::failure::{Failure, Kind};
+use cangauge::tasks::lss::{Descriptions, Target, inquire};
 use std::time::Duration;
 
 const ONE: [u32; 4] = [0x362, 0x0044_3150, 0x0001_0000, 20002];
@@ -31,6 +34,23 @@ fn run<T>(bus: &mut MemoryBus, services: impl FnOnce(&mut Lss) -> Result<T, LssE
     while bus.receive(until).unwrap() != Event::Timeout {}
     assert_eq!(configuring(bus).len(), 0, "left in configuration state");
     result
+}
+
+#[test]
+fn inquiry_reports_an_answer_with_another_specifier() {
+    for (service, answer) in [(0x5e, vec![0x5d, 5, 0, 0, 0, 0, 0, 0]), (0x5a, vec![0x5b, 0x62, 3, 0, 0, 0, 0, 0])] {
+        let mut slave = Slave::new(ONE, 5);
+        slave.answers.insert(service, answer);
+        let (mut bus, overrides, mut notes) = (bus_of([slave]), Overrides::new(), Vec::new());
+        let target = Target::Address(address(ONE));
+        let named = Descriptions { overrides: &overrides, given: None };
+        let mut master = Master::new(&mut bus, Timing::default());
+        let found =
+            inquire(&mut master, &target, &named, &mut |note| notes.push(note)).expect("one inquiry is answered");
+        assert_eq!((found.address.is_some(), found.node.is_some()), (service == 0x5e, service == 0x5a));
+        let is_reported = |note: &Note| format!("{:?}", note.fact).contains("OtherAnswer");
+        assert_eq!(notes.iter().filter(|note| is_reported(note)).count(), 1, "{notes:?}");
+    }
 }
 
 /// Sets the node-ID of the slave with this address, as the task does.
