@@ -1,6 +1,5 @@
 //! Answers of the wrong length, and more than one answer to a request.
 
-use super::Kept;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
@@ -14,7 +13,6 @@ use cangauge::measure::sample::Doubt;
 use cangauge::node::survey::{identify, survey_each};
 use cangauge::node::{self, Node, Overrides, write};
 use cangauge::sim::{Device, Setup};
-use cangauge::tasks::log::{LogOptions, Mode, log};
 use cangauge::tasks::read::{Readings, read as read_signals};
 use cangauge::tasks::{Failure, Kind};
 use std::time::Duration;
@@ -326,25 +324,6 @@ fn silent_status_object_is_an_unknown_status() {
     let (_, sample) = &readings_of("dps", &[0x6132])[0];
     assert_eq!((sample.value.is_some(), sample.doubt), (true, Some(Doubt::UnknownDigits)));
     assert_eq!(readings("mh4", &[0x6130]).expect_err("the value does not answer").kind(), Kind::NoAnswer);
-}
-
-#[test]
-fn silent_status_object_does_not_slow_polling_down() {
-    with_mute("mh4", &[0x6150], |master| {
-        let options = LogOptions {
-            nodes: vec![node()],
-            wanted: Vec::new(),
-            mode: Mode::Poll(Duration::from_millis(100)),
-            // After its boot-up, requests are repeated for 5 s.
-            duration: Some(Duration::from_secs(20)),
-            count: None,
-            nmt: true,
-            max_gap: None,
-            overrides: Overrides::new(),
-        };
-        let report = log(master, &options, &mut Kept::default()).expect("the values answer");
-        assert!(report.rows > 100, "{}", report.rows);
-    });
 }
 
 #[test]
