@@ -1355,7 +1355,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__config__subcmd__apply)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --store --reset --dry-run --exact --address --with-calibration --rollback --table --record --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --store --reset --dry-run --exact --address --with-calibration --rollback --table --prompt --record --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0

@@ -58,6 +58,7 @@ const BUS_TRAIT: &[&str] = &[
     "Stamp",
     "TimestampSource",
     "Wall",
+    "parallel",
     "time",
 ];
 

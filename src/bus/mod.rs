@@ -12,6 +12,7 @@ pub mod interrupt;
 pub mod memory;
 mod own_clock;
 pub mod owner;
+pub mod parallel;
 mod pcapng;
 #[cfg(unix)]
 mod poll;
@@ -29,6 +30,7 @@ pub mod stdout;
 mod stream;
 pub mod time;
 pub mod trace;
+pub mod typed;
 
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;

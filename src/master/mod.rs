@@ -9,6 +9,7 @@ mod foreign_traffic;
 pub mod lss;
 mod machine;
 mod missed_answer;
+mod parallel;
 mod request;
 mod sdo;
 mod second_answer;
@@ -111,8 +112,7 @@ pub struct Master<'bus> {
 impl<'bus> Master<'bus> {
     /// A master on `bus`.
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
-        let outgoing = Outgoing::new();
-        let (sdo, filters) = (SdoClient::default(), Filters::All);
+        let (sdo, filters, outgoing) = (SdoClient::default(), Filters::All, Outgoing::new());
         Master { bus, timing, sdo, filters, receives_all: false, outgoing, pending: None, seen: Mono::START }
     }
 

@@ -306,6 +306,21 @@ impl SdoClient {
         self.can_start |= node.active.is_none() && !node.waiting.is_empty();
     }
 
+    pub(super) fn on_two_devices(&self) -> OnTwoDevices {
+        self.on_two_devices
+    }
+
+    /// Takes over what another client found out about its nodes.
+    pub(super) fn merge(&mut self, other: SdoClient) {
+        self.odd_heartbeats.extend(other.odd_heartbeats);
+        for (id, other) in other.nodes {
+            let node = self.nodes.entry(id).or_default();
+            node.answers = other.answers;
+            node.is_written |= other.is_written;
+            node.stale.extend(other.stale);
+        }
+    }
+
     /// The nodes with second answers.
     pub(super) fn second_answers(&self) -> impl Iterator<Item = (NodeId, SecondAnswer)> {
         self.nodes.iter().filter_map(|(&id, node)| Some((id, node.answers.finding()?)))

@@ -153,7 +153,8 @@ impl Outgoing {
                 self.first_at = is_taken.then_some(now);
             }
             if let Some(ticket) = ticket {
-                sent(*ticket, now);
+                // A bus with several masters lets a frame wait for its turn.
+                sent(*ticket, bus.mono());
             }
             // Uses the length of this frame. With the longest length, a long burst would be slower than the bus.
             if let Some(bit_rate) = bit_rate {

@@ -17,6 +17,7 @@
 //! bit_rate = 125000          # at a different bit rate than the bus, the device neither receives nor sends
 //! latency = "300us"          # response time
 //! offline_after = ["reset"]  # after this, the device is offline until a power cycle; or "activate"
+//! connected = { from = "2s", until = "9s" }    # plugged in and unplugged; default: always connected
 //! answers_only = ["0x1000"]  # no answer to SDO requests for any other object
 //! serial = 4711
 //! start = true               # becomes OPERATIONAL by itself
@@ -147,7 +148,8 @@ impl Bench {
         let mut of_kind: BTreeMap<String, u32> = BTreeMap::new();
         let mut devices = Vec::new();
         for entry in &file.device {
-            if let Some(node) = entry.node.filter(|node| !taken.insert(*node) && !entry.duplicate_id) {
+            let may_share = entry.duplicate_id || entry.is_plugged();
+            if let Some(node) = entry.node.filter(|node| !taken.insert(*node) && !may_share) {
                 return Err(BenchError::Usage(format!("two devices with node-ID {node}")));
             }
             let before = of_kind.entry(entry.kind.clone()).or_default();

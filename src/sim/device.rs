@@ -76,6 +76,9 @@ pub struct Device {
     overloaded: BTreeMap<u8, Direction>,
     /// Answers that are not due yet.
     delayed: VecDeque<(Mono, Frame)>,
+    /// When it is plugged in and unplugged next.
+    connections: VecDeque<Mono>,
+    is_connected: bool,
     recorder: Option<Recorder>,
     remembered: Option<console::Remembered>,
     /// Whether it neither receives nor sends, as the user asked.
@@ -112,6 +115,9 @@ impl Device {
         let settings = Settings::new(description, &objects, pair);
         let memory = Memory { node, settings, objects, channels, emergencies, remap: description.pdo.remap };
         let oddities = &setup.oddities;
+        let connected = oddities.connected.iter().flat_map(|connected| [connected.start, connected.end]);
+        let is_end = |moment: &Duration| *moment == Duration::MAX;
+        let connections: VecDeque<Mono> = connected.filter(|moment| !is_end(moment)).map(Mono::at).collect();
         let lss = Slave::new(setup.sim.lss.clone(), oddities.refuse.clone(), oddities.endless_fastscan);
         Ok(Device {
             setup,
@@ -126,6 +132,8 @@ impl Device {
             next_overload_change: None,
             overloaded: BTreeMap::new(),
             delayed: VecDeque::new(),
+            is_connected: connections.is_empty(),
+            connections,
             recorder: None,
             remembered: None,
             is_silent: false,

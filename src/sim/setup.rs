@@ -7,6 +7,7 @@ use crate::canopen::object::ObjectId;
 use crate::device::catalog::Model;
 use crate::device::scalar::Scalar;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -57,6 +58,8 @@ pub struct Oddities {
     pub answers_only: Vec<ObjectId>,
     /// Events after which the device is offline until a power cycle.
     pub offline_after: Vec<OfflineAfter>,
+    /// When it is plugged in, and when it is unplugged. `None`: it is always connected.
+    pub connected: Option<Range<Duration>>,
 }
 
 /// An event after which a device is offline until a power cycle.

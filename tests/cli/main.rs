@@ -6,6 +6,7 @@ mod autozero;
 mod bus;
 mod check;
 mod config;
+mod config_series;
 mod descriptions;
 mod devices;
 mod doctor;

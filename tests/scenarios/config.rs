@@ -13,7 +13,7 @@ use cangauge::node::Overrides;
 use cangauge::output::config::write_toml;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Setup};
-use cangauge::tasks::config::{Applied, File, Journal, Options, Sections, Snapshot, apply, read, resume};
+use cangauge::tasks::config::{Applied, Arrivals, File, Journal, Options, Sections, Snapshot, apply, read, resume};
 use cangauge::tasks::restore::restore;
 use cangauge::tasks::store::Group;
 use cangauge::tasks::{Failure, Kind};
@@ -266,4 +266,30 @@ fn an_address_is_set_last_and_confirmed() {
         let again = set(&mut bus, new, &file, &options).unwrap_or_else(|failure| panic!("{device}: {failure}"));
         assert_eq!(again.rows, [], "{device}");
     }
+}
+
+/// Devices are plugged in one after the other: the new one is found, one that was there before is not, and two at once
+/// are both reported.
+#[test]
+fn devices_that_are_plugged_in_are_found_one_by_one() {
+    let mut bus = bus("d20");
+    for (number, serial, from, until) in [(1, 71, 4, 8), (2, 72, 30, 60), (3, 73, 30, 45)] {
+        let mut setup = Setup::new(by_name("mh4").expect("built in"), node(number));
+        setup.serial = serial;
+        setup.oddities.connected = Some(Duration::from_secs(from)..Duration::from_secs(until));
+        bus.attach(Device::new(setup).expect("a device"));
+    }
+    let mut master = Master::new(&mut bus, Timing::default());
+    let (mut arrivals, mut seen) = (Arrivals::default(), Vec::new());
+    while master.now() < Mono::at(Duration::from_secs(80)) {
+        let found = arrivals.search(&mut master).expect("the bus works");
+        let serials: Vec<u32> = found.iter().filter_map(|one| Some(one.address?.serial)).collect();
+        if seen.last() != Some(&serials) {
+            seen.push(serials);
+        }
+        if let [only] = &found[..] {
+            while !arrivals.is_unplugged(&mut master, only).expect("the bus works") {}
+        }
+    }
+    assert_eq!(seen, [vec![], vec![71], vec![], vec![72, 73], vec![72], vec![]]);
 }

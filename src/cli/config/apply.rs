@@ -1,6 +1,9 @@
 //! `cangauge config apply`.
 
+mod prompt;
+
 use super::journal::{FileJournal, latest};
+use super::table::Table;
 use super::{Failures, described, file, mistakes, nodes_and_file, parse};
 use crate::bus::Wall;
 use crate::bus::claim::Claim;
@@ -15,6 +18,7 @@ use crate::node::survey::identify_each;
 use crate::node::{Node, Overrides};
 use crate::output::config::{AppliedReport, LineReport};
 use crate::output::config_record::ConfigRecord;
+use crate::output::console::Console;
 use crate::output::failure::ErrorMessage;
 use crate::output::notes;
 use crate::tasks::config::diff::check_offline;
@@ -63,6 +67,11 @@ pub(super) struct Apply {
     /// {NAME} in the file. A device that is not in the table is not changed
     #[arg(long, value_name = "FILE.csv", conflicts_with = "rollback")]
     table: Option<PathBuf>,
+    /// Set devices that are plugged in one after the other, each with the values of its row. Includes --address and
+    /// --store. The result is written to the column "result" of the table. To compare the serial number with the label,
+    /// type it before the device is plugged in
+    #[arg(long, requires = "table", conflicts_with = "dry_run")]
+    prompt: bool,
     /// Write a record: time, devices, old and new values, verification. HTML if the name ends with .html, else JSON
     #[arg(long, value_name = "FILE", conflicts_with = "dry_run")]
     record: Option<PathBuf>,
@@ -122,6 +131,7 @@ impl Apply {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let record = self.record.as_ref().map(|path| ReportFile::create(path, false, None)).transpose()?;
         let (asked, (bus, time), (done, failures)) = match &self.table {
+            Some(table) if self.prompt => self.by_prompt(global, table)?,
             Some(table) => self.by_table(global, table)?,
             None => self.by_nodes(global)?,
         };
@@ -167,14 +177,21 @@ impl Apply {
         })
     }
 
+    /// Reads the table, and the file with the values of each row.
+    fn table(&self, table: &Path) -> anyhow::Result<Table> {
+        match self.words.as_slice() {
+            [file] => Table::read(table, file, self.sets_address()),
+            _ => Err(ErrorMessage::usage("--table replaces NODES: cangauge config apply --table FILE.csv FILE").into()),
+        }
+    }
+
+    fn sets_address(&self) -> bool {
+        self.address || self.prompt
+    }
+
     /// Configures the devices of a table, which are found by their identity.
     fn by_table(&self, global: &Global, table: &Path) -> anyhow::Result<(usize, (String, Wall), Results)> {
-        let [file] = self.words.as_slice() else {
-            return Err(
-                ErrorMessage::usage("--table replaces NODES: cangauge config apply --table FILE.csv FILE").into()
-            );
-        };
-        let rows = super::table::read(table, file, self.address)?;
+        let rows = self.table(table)?.rows;
         rows.iter().try_for_each(|row| check_before(&row.document, &row.label))?;
         global.with_master(|master| {
             let nodes = open::all(master, global)?;
@@ -204,22 +221,23 @@ impl Apply {
         })
     }
 
-    /// Configures one device after the other. A bus failure or Ctrl-C ends the work.
+    /// Configures all devices at the same time. Addresses are set one after the other, because LSS reaches all devices.
+    /// A bus failure or Ctrl-C ends the work.
     fn work(&self, global: &Global, master: &mut Master<'_>, jobs: Vec<Job>, overrides: &Overrides) -> Results {
-        let (mut done, mut failures) = (Vec::new(), Failures::new());
+        let console = global.console();
+        if jobs.len() > 1 && !self.address {
+            return split(master.in_parallel(jobs, &|master, job| self.one(&console, master, &job, overrides)));
+        }
+        let mut results = Vec::new();
         for job in &jobs {
-            match self.one(global, master, job, overrides) {
-                Ok(outcome) => done.push(outcome),
-                Err(of_node) => {
-                    let ends = of_node.iter().any(|failure| matches!(failure.kind(), Kind::Interrupted | Kind::Bus));
-                    failures.push(of_node);
-                    if ends {
-                        break;
-                    }
-                }
+            let result = self.one(&console, master, job, overrides);
+            let ends = result.as_ref().is_err_and(|failures| failures.iter().any(ends_all));
+            results.push(result);
+            if ends {
+                break;
             }
         }
-        (done, failures)
+        split(results)
     }
 
     fn usage(&self) -> ErrorMessage {
@@ -234,17 +252,17 @@ impl Apply {
     fn options(&self) -> Options {
         let mut arguments: Vec<&str> = self.words.last().map(String::as_str).into_iter().collect();
         let flags = [
-            (self.store, "--store"),
+            (self.store || self.prompt, "--store"),
             (self.reset, "--reset"),
             (self.exact, "--exact"),
-            (self.address, "--address"),
+            (self.sets_address(), "--address"),
             (self.with_calibration, "--with-calibration"),
         ];
         arguments.extend(flags.iter().filter(|(is_given, _)| *is_given).map(|(_, flag)| *flag));
         Options {
-            sections: Sections { address: self.address, calibration: self.with_calibration || self.rollback },
+            sections: Sections { address: self.sets_address(), calibration: self.with_calibration || self.rollback },
             exact: self.exact,
-            store: self.store,
+            store: self.store || self.prompt,
             reset: self.reset,
             arguments: arguments.join(" "),
         }
@@ -253,7 +271,7 @@ impl Apply {
     /// Configures one device.
     fn one(
         &self,
-        global: &Global,
+        console: &Console,
         master: &mut Master<'_>,
         job: &Job,
         overrides: &Overrides,
@@ -262,7 +280,7 @@ impl Apply {
         let node = job.node;
         master.listen_to(&[node]).map_err(|error| one(error.into()))?;
         let snapshot = read(master, node, overrides, job.file.as_ref()).map_err(one)?;
-        let mut journal = FileJournal::new(master.bus().name(), &snapshot, global);
+        let mut journal = FileJournal::new(master.bus().name(), &snapshot, console);
         let interrupted = latest(master.bus().name(), &snapshot).and_then(|(file, text)| {
             let unreadable = || Failure::at(node, ConfigFailure::Journal { reason: file.clone() });
             let document = parse(&file, &text).map_err(|_| unreadable())?;
@@ -322,6 +340,23 @@ impl Apply {
         }
         Ok(())
     }
+}
+
+/// The results, and the failures of each device.
+fn split(results: Vec<Result<Outcome, Vec<Failure>>>) -> Results {
+    let (mut done, mut failures) = (Vec::new(), Failures::new());
+    for result in results {
+        match result {
+            Ok(outcome) => done.push(outcome),
+            Err(of_node) => failures.push(of_node),
+        }
+    }
+    (done, failures)
+}
+
+/// Whether a failure concerns the devices that follow, too.
+fn ends_all(failure: &Failure) -> bool {
+    matches!(failure.kind(), Kind::Interrupted | Kind::Bus)
 }
 
 /// The name of the bus, and its time.

@@ -4,8 +4,8 @@
 //! write, and removed after success. It is kept if the change fails or the program is killed.
 
 use super::apply::text_of;
-use crate::cli::Global;
 use crate::cli::journal::{folder, sync_folder, write_synced};
+use crate::output::console::Console;
 use crate::tasks::Failure;
 use crate::tasks::config::{ConfigFailure, Journal, Snapshot};
 use std::fs::{self, File};
@@ -27,21 +27,19 @@ fn file(bus: &str, snapshot: &Snapshot) -> Option<PathBuf> {
 /// The journal of one device.
 pub(super) struct FileJournal<'a> {
     path: Option<PathBuf>,
-    global: &'a Global,
+    console: &'a Console,
 }
 
 impl<'a> FileJournal<'a> {
-    pub(super) fn new(bus: &str, snapshot: &Snapshot, global: &'a Global) -> FileJournal<'a> {
-        FileJournal { path: file(bus, snapshot), global }
+    pub(super) fn new(bus: &str, snapshot: &Snapshot, console: &'a Console) -> FileJournal<'a> {
+        FileJournal { path: file(bus, snapshot), console }
     }
 }
 
 impl Journal for FileJournal<'_> {
     fn begin(&mut self, before: &Snapshot) -> Result<(), Failure> {
         let Some(path) = &self.path else {
-            self.global
-                .console()
-                .note("no journal: neither XDG_STATE_HOME nor HOME is set; --rollback is not possible");
+            self.console.note("no journal: neither XDG_STATE_HOME nor HOME is set; --rollback is not possible");
             return Ok(());
         };
         // An earlier change was not completed, so the settings before that change are kept.

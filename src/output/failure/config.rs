@@ -45,6 +45,15 @@ pub(super) fn words(cause: &ConfigFailure) -> Words {
             let list: Vec<String> = nodes.iter().map(ToString::to_string).collect();
             Words::new(format!("several devices have the serial number {serial}: node {}", list.join(", ")))
         }
+        ConfigFailure::NotPluggedIn { serials } => {
+            let list: Vec<String> = serials.iter().map(ToString::to_string).collect();
+            Words::new(format!("not plugged in, or not set: serial number {}", list.join(", ")))
+                .hint("run the same command again: it continues with these")
+        }
+        ConfigFailure::NoNodeId { serial } => Words::new(format!(
+            "the device with the serial number {serial} has no node-ID, and the table has none for it"
+        ))
+        .hint("add it to the column \"node\""),
         ConfigFailure::Journal { reason } => Words::new(format!("the journal cannot be written: {reason}")),
         ConfigFailure::NoJournal => Words::new("nothing to roll back: the last change of this device was complete"),
     }

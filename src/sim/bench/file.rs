@@ -68,6 +68,7 @@ pub(super) struct DeviceEntry {
     answers_only: Vec<ObjectId>,
     #[serde(default)]
     offline_after: Vec<OfflineName>,
+    connected: Option<Connected>,
     #[serde(default)]
     lss: LssEntry,
     serial: Option<u32>,
@@ -82,6 +83,15 @@ pub(super) struct DeviceEntry {
     /// Constant values of the one-line form: `pressure=0bar`.
     #[serde(skip)]
     constant: Vec<String>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Connected {
+    #[serde(deserialize_with = "duration")]
+    from: Duration,
+    #[serde(default = "no_end", deserialize_with = "duration")]
+    until: Duration,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -181,6 +191,11 @@ impl DeviceEntry {
         DeviceEntry { kind: kind.to_owned(), node, constant, ..DeviceEntry::default() }
     }
 
+    /// Whether it is not on the bus all the time.
+    pub(super) fn is_plugged(&self) -> bool {
+        self.connected.is_some()
+    }
+
     /// The short form: `mh4@5`.
     pub(super) fn name(&self) -> String {
         match self.node {
@@ -203,6 +218,7 @@ impl DeviceEntry {
             endless_fastscan: self.lss.endless_fastscan,
             answers_only: self.answers_only.clone(),
             offline_after: self.offline_after.iter().map(|name| OfflineAfter::from(*name)).collect(),
+            connected: self.connected.map(|connected| connected.from..connected.until),
         };
         setup.serial = self.serial.unwrap_or(setup.serial.wrapping_add(before));
         setup.start = self.start;

@@ -6,6 +6,10 @@ use crate::bus::memory::{Station, Tuning};
 impl Station for Device {
     fn power_on(&mut self, now: Mono, out: &mut Outbox) {
         self.drop_pending(out);
+        if !self.is_connected {
+            self.phase = Phase::Off;
+            return;
+        }
         self.memory.emergencies.forget();
         self.memory.settings.power_on();
         self.restart(Area::All);
@@ -18,12 +22,17 @@ impl Station for Device {
     }
 
     fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        if self.connections.front().is_some_and(|due| *due <= now) {
+            self.connections.pop_front();
+            self.is_connected = !self.is_connected;
+            return self.power_on(now, out);
+        }
         self.work(now, out);
         self.remember();
     }
 
     fn next_wake(&self) -> Option<Mono> {
-        match self.phase {
+        let own = match self.phase {
             Phase::Off => None,
             Phase::Starting(until) => Some(until),
             Phase::Unconfigured => self.delayed.front().map(|(due, _)| *due),
@@ -43,7 +52,8 @@ impl Station for Device {
                 self.tpdos.iter().for_each(|tpdo| add(tpdo.next_wake()));
                 next
             }
-        }
+        };
+        self.connections.front().copied().into_iter().chain(own).min()
     }
 
     fn sent(&mut self, now: Mono, frame: &Frame) {

@@ -53,6 +53,16 @@ pub enum ConfigFailure {
         /// The nodes with this identity.
         nodes: Vec<NodeId>,
     },
+    /// Devices of a table were not plugged in.
+    NotPluggedIn {
+        /// The serial numbers.
+        serials: Vec<u32>,
+    },
+    /// A device without a node-ID, and the table has none for it.
+    NoNodeId {
+        /// The serial number.
+        serial: u32,
+    },
     /// The journal could not be written.
     Journal {
         /// The reason.
@@ -114,7 +124,8 @@ impl ConfigFailure {
                 Kind::CheckFailed
             }
             ConfigFailure::NotOneDevice { nodes, .. } if nodes.is_empty() => Kind::NoAnswer,
-            ConfigFailure::NotOneDevice { .. } => Kind::CheckFailed,
+            ConfigFailure::NotPluggedIn { .. } => Kind::NoAnswer,
+            ConfigFailure::NotOneDevice { .. } | ConfigFailure::NoNodeId { .. } => Kind::CheckFailed,
             ConfigFailure::NotKept { .. } => Kind::Unexpected,
             ConfigFailure::Journal { .. } => Kind::Io,
         }

@@ -4,6 +4,7 @@
 //! settings; [`crate::device::config_file::Document`] is a file.
 
 mod apply;
+mod arrivals;
 mod check;
 mod conditions;
 mod dcf;
@@ -19,6 +20,7 @@ mod snapshot;
 pub mod value;
 
 pub use apply::{Applied, Journal, Options, Row as ChangedRow, apply, targets};
+pub use arrivals::{Arrivals, assign_first};
 pub use check::{FileSettings, Sections, Wanted, check};
 pub use conditions::check_device;
 pub use dump::{Dump, Row, SECTIONS};

@@ -1,0 +1,362 @@
+//! Several procedures on one bus at the same time. Each has its own [`Bus`] and its own thread. Only one of them runs at
+//! a time, and the others wait for an event. So the order of the frames depends on the bus only.
+
+use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, Stamp, TimestampSource};
+use crate::canopen::frame::Frame;
+use crate::canopen::wire_length::frame_time;
+use std::cell::Cell;
+use std::collections::VecDeque;
+use std::panic::resume_unwind;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
+use std::time::Duration;
+
+/// The bus load of all procedures on a silent bus: frames with a lower priority, as heartbeats, need the rest.
+const OWN_LOAD: f64 = 0.9;
+
+/// The bus load together with the traffic of others.
+const SHARED_LOAD: f64 = 0.5;
+
+/// The lowest load of the procedures, however much traffic there is.
+const LEAST_LOAD: f64 = 0.05;
+
+/// How long the traffic of others is measured.
+const WINDOW: Duration = Duration::from_millis(100);
+
+/// The time of the frames that may wait in the transmit queue.
+const QUEUED: Duration = Duration::from_millis(2);
+
+/// Runs `work` for all items at the same time; the results have the order of the items. A procedure cannot change the
+/// bit rate of the interface. A failure of the bus is an error for each procedure that waits.
+pub fn in_parallel<T: Send, R: Send>(
+    bus: &mut dyn Bus,
+    items: Vec<T>,
+    work: &(dyn Fn(&mut dyn Bus, T) -> R + Sync),
+) -> Vec<R> {
+    thread::scope(|scope| {
+        let (mut procedures, mut threads) = (Vec::new(), Vec::new());
+        for item in items {
+            let ((calls, called), (answers, answered)) = (channel(), channel());
+            let mut share = Share {
+                name: bus.name().to_owned(),
+                timestamps: bus.timestamps(),
+                is_live: bus.is_live(),
+                waits: bus.waits(),
+                bit_rate: bus.bit_rate(),
+                last: Cell::new(bus.now()),
+                calls,
+                answers: answered,
+            };
+            threads.push(scope.spawn(move || work(&mut share, item)));
+            let missed = VecDeque::new();
+            procedures.push(Procedure { calls: called, answers, filters: Filters::All, until: None, missed });
+        }
+        Conductor::new(bus, procedures).carry_out();
+        let results = threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        results.collect()
+    })
+}
+
+/// A call of a procedure. The thread with the real bus carries it out.
+enum Call {
+    Now,
+    Listen(Filters),
+    Send(Frame),
+    Receive(Mono),
+}
+
+enum Answer {
+    Now(Stamp),
+    Done(Result<(), BusError>),
+    Event(Result<Event, BusError>),
+}
+
+/// The bus of one procedure.
+struct Share {
+    name: String,
+    timestamps: TimestampSource,
+    is_live: bool,
+    waits: bool,
+    bit_rate: Option<u32>,
+    /// The last known moment.
+    last: Cell<Stamp>,
+    calls: Sender<Call>,
+    answers: Receiver<Answer>,
+}
+
+impl Share {
+    /// `None` if the thread with the real bus ended.
+    fn call(&self, call: Call) -> Option<Answer> {
+        self.calls.send(call).ok()?;
+        self.answers.recv().ok()
+    }
+
+    fn done(&self, call: Call) -> Result<(), BusError> {
+        match self.call(call) {
+            Some(Answer::Done(result)) => result,
+            _ => Err(BusError::Down(self.name.clone())),
+        }
+    }
+}
+
+impl Bus for Share {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        self.timestamps
+    }
+
+    fn is_live(&self) -> bool {
+        self.is_live
+    }
+
+    fn waits(&self) -> bool {
+        self.waits
+    }
+
+    fn now(&self) -> Stamp {
+        if let Some(Answer::Now(now)) = self.call(Call::Now) {
+            self.last.set(now);
+        }
+        self.last.get()
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        self.done(Call::Listen(filters.clone()))
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.done(Call::Send(*frame))
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        match self.call(Call::Receive(deadline)) {
+            Some(Answer::Event(event)) => event,
+            _ => Err(BusError::Down(self.name.clone())),
+        }
+    }
+}
+
+impl BitRateControl for Share {
+    fn bit_rate(&self) -> Option<u32> {
+        self.bit_rate
+    }
+}
+
+/// A procedure, for the thread with the real bus.
+struct Procedure {
+    calls: Receiver<Call>,
+    answers: Sender<Answer>,
+    filters: Filters,
+    /// Until when it waits for an event; `None` if it waits to send, or ended.
+    until: Option<Mono>,
+    /// Events while it waits to send.
+    missed: VecDeque<Event>,
+}
+
+/// Limits the bus load of the procedures.
+struct Pace {
+    /// `None`: unknown, so that nothing is limited.
+    bit_rate: Option<u32>,
+    /// When the next frame may be sent.
+    ready_at: Mono,
+    /// The end of the present measurement of other traffic, and the time of its frames.
+    window_end: Mono,
+    others: Duration,
+    /// The load of other traffic in the last window.
+    load: f64,
+}
+
+impl Pace {
+    /// A frame is sent. Its answer takes as long.
+    fn on_sent(&mut self, frame: &Frame, now: Mono) {
+        let Some(bit_rate) = self.bit_rate else { return };
+        if now >= self.window_end {
+            self.load = self.others.as_secs_f64() / (now.since(self.window_end) + WINDOW).as_secs_f64();
+            (self.window_end, self.others) = (now + WINDOW, Duration::ZERO);
+        }
+        let load = if self.load > 0.01 { (SHARED_LOAD - self.load).max(LEAST_LOAD) } else { OWN_LOAD };
+        let earliest = Mono::at(now.since_start().saturating_sub(QUEUED));
+        self.ready_at = self.ready_at.max(earliest) + (2 * frame_time(frame, bit_rate)).div_f64(load);
+    }
+
+    fn on_other(&mut self, frame: &Frame) {
+        self.others += self.bit_rate.map_or(Duration::ZERO, |bit_rate| frame_time(frame, bit_rate));
+    }
+}
+
+/// Carries out the calls of all procedures on the real bus.
+struct Conductor<'a> {
+    bus: &'a mut dyn Bus,
+    procedures: Vec<Procedure>,
+    /// The frames that wait for their turn, with their procedures.
+    waiting: VecDeque<(usize, Frame)>,
+    pace: Pace,
+}
+
+impl Conductor<'_> {
+    fn new(bus: &mut dyn Bus, procedures: Vec<Procedure>) -> Conductor<'_> {
+        let (now, bit_rate) = (bus.mono(), bus.bit_rate().filter(|rate| *rate > 0));
+        let pace = Pace { bit_rate, ready_at: now, window_end: now + WINDOW, others: Duration::ZERO, load: 0.0 };
+        Conductor { bus, procedures, waiting: VecDeque::new(), pace }
+    }
+
+    /// Receives events for all procedures, until they have ended.
+    fn carry_out(&mut self) {
+        (0..self.procedures.len()).for_each(|at| self.serve(at));
+        loop {
+            self.send_waiting();
+            let ready_at = self.waiting.front().map(|_| self.pace.ready_at);
+            let untils = self.procedures.iter().filter_map(|procedure| procedure.until);
+            let Some(until) = untils.chain(ready_at).min() else { return };
+            let event = self.bus.receive(until);
+            self.deliver(event, until.max(self.bus.mono()));
+        }
+    }
+
+    /// Gives an event to the procedures that it concerns.
+    fn deliver(&mut self, event: Result<Event, BusError>, now: Mono) {
+        let Ok(event) = event else {
+            // The next one that waits gets the next error.
+            let Some(at) = self.procedures.iter().position(|procedure| procedure.until.is_some()) else { return };
+            return self.answer(at, Answer::Event(event));
+        };
+        let mut is_ours = false;
+        for at in 0..self.procedures.len() {
+            let procedure = &mut self.procedures[at];
+            let concerns = match event {
+                Event::Frame(received) => procedure.filters.wants(&received.frame),
+                Event::Timeout => procedure.until.is_some_and(|until| until <= now),
+                _ => true,
+            };
+            is_ours |= concerns;
+            match procedure.until {
+                Some(_) if concerns => self.answer(at, Answer::Event(Ok(event))),
+                None if concerns && event != Event::Timeout => procedure.missed.push_back(event),
+                _ => {}
+            }
+        }
+        if let (Event::Frame(received), false) = (event, is_ours) {
+            self.pace.on_other(&received.frame);
+        }
+    }
+
+    /// Sends the frames whose turn has come, in their order.
+    fn send_waiting(&mut self) {
+        while self.pace.ready_at <= self.bus.mono()
+            && let Some((at, frame)) = self.waiting.pop_front()
+        {
+            let result = self.bus.send(&frame);
+            if result.is_ok() {
+                self.pace.on_sent(&frame, self.bus.mono());
+            }
+            self.answer(at, Answer::Done(result));
+        }
+    }
+
+    /// Answers a call of a procedure, and carries out its next calls.
+    fn answer(&mut self, at: usize, answer: Answer) {
+        // If the procedure has ended, the next call is the end.
+        let _ = self.procedures[at].answers.send(answer);
+        self.serve(at);
+    }
+
+    /// Carries out the calls of one procedure until it waits or ends.
+    fn serve(&mut self, at: usize) {
+        let procedure = &mut self.procedures[at];
+        procedure.until = None;
+        loop {
+            let answer = match procedure.calls.recv() {
+                Ok(Call::Receive(until)) => match procedure.missed.pop_front() {
+                    Some(event) => Answer::Event(Ok(event)),
+                    None => {
+                        procedure.until = Some(until);
+                        return;
+                    }
+                },
+                Ok(Call::Now) => Answer::Now(self.bus.now()),
+                Ok(Call::Send(frame)) => {
+                    self.waiting.push_back((at, frame));
+                    return;
+                }
+                Ok(Call::Listen(filters)) => {
+                    procedure.filters = filters;
+                    // The traffic of others is measured as well.
+                    Answer::Done(self.bus.listen(&Filters::All))
+                }
+                Err(_) => {
+                    procedure.filters = Filters::Only(Vec::new());
+                    return;
+                }
+            };
+            // If the procedure has ended, the next call is the end.
+            let _ = procedure.answers.send(answer);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::memory::{Clock, MemoryBus, Outbox, Station};
+    use std::time::Duration;
+
+    /// Answers each frame with the same data and the next identifier.
+    struct Echo;
+
+    impl Station for Echo {
+        fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+        fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+            let text = frame.to_string().replacen('1', "2", 1);
+            out.send(text.parse().expect("a frame"));
+        }
+
+        fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+        fn next_wake(&self) -> Option<Mono> {
+            None
+        }
+
+        fn sent(&mut self, _: Mono, _: &Frame) {}
+    }
+
+    fn ms(milliseconds: u64) -> Mono {
+        Mono::at(Duration::from_millis(milliseconds))
+    }
+
+    #[test]
+    fn procedures_share_the_bus_and_get_their_own_frames_and_deadlines() {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Echo);
+        let ask = |bus: &mut dyn Bus, number: u64| {
+            let wanted: Frame = format!("20{number}#0{number}").parse().expect("a frame");
+            bus.listen(&Filters::Only(vec![wanted.id()])).expect("filters");
+            bus.send(&format!("10{number}#0{number}").parse().expect("a frame")).expect("sent");
+            let answer = bus.receive(ms(100)).expect("an event");
+            assert!(matches!(answer, Event::Frame(received) if received.frame == wanted), "{number}: {answer:?}");
+            assert_eq!(bus.receive(ms(100 + number)).expect("an event"), Event::Timeout);
+            bus.now().mono
+        };
+        let ends = in_parallel(&mut bus, vec![3, 1, 2], &ask);
+        assert_eq!(ends, [ms(103), ms(101), ms(102)]);
+    }
+
+    #[test]
+    fn each_procedure_is_interrupted_and_reports_by_itself() {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.interrupt_at(ms(5));
+        let wait = |bus: &mut dyn Bus, until: Mono| bus.receive(until).expect("an event");
+        let events = in_parallel(&mut bus, vec![ms(1), ms(9), ms(8)], &wait);
+        assert_eq!(events, [Event::Timeout, Event::Interrupted, Event::Interrupted]);
+    }
+
+    #[test]
+    #[should_panic(expected = "a mistake")]
+    fn a_panic_reaches_the_caller() {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        in_parallel(&mut bus, vec![1, 2], &|_, number| assert_eq!(number, 1, "a mistake"));
+    }
+}

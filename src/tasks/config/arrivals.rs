@@ -1,0 +1,106 @@
+//! The devices that are plugged in one after the other (`config apply --prompt`).
+
+use crate::canopen::id::NodeId;
+use crate::canopen::lss::LssAddress;
+use crate::master::Master;
+use crate::node::Overrides;
+use crate::node::wait::{Policy, pause};
+use crate::tasks::lss::{Descriptions, FoundSlave, Job, Target, Via, assign, scan};
+use crate::tasks::{Failure, Kind, Note};
+use std::time::Duration;
+
+/// The time between two searches.
+const SEARCH_INTERVAL: Duration = Duration::from_secs(1);
+
+/// In how many searches in a row a device must be missing: it may just restart.
+const MISSES: u32 = 2;
+
+/// Finds devices that are new on the bus.
+#[derive(Clone, Debug, Default)]
+pub struct Arrivals {
+    /// The devices that are not new. `None` before the first search.
+    known: Option<Vec<FoundSlave>>,
+    misses: u32,
+}
+
+/// Whether two searches found the same device.
+fn is_same(one: &FoundSlave, other: &FoundSlave) -> bool {
+    one.node == other.node && one.address == other.address
+}
+
+/// Whether a device has no node-ID, or that of a new device.
+fn is_delivered(found: &FoundSlave) -> bool {
+    let factory = found.model.as_ref().and_then(|model| model.description.factory.node_id);
+    found.node.is_none() || factory == found.node
+}
+
+impl Arrivals {
+    /// Searches once for new devices: those that were not on the bus before, and in the first search those without a
+    /// node-ID and with the factory node-ID of their kind. Nothing is changed.
+    ///
+    /// # Errors
+    /// Bus errors and Ctrl-C.
+    pub fn search(&mut self, master: &mut Master<'_>) -> Result<Vec<FoundSlave>, Failure> {
+        let Some(found) = look(master)? else { return Ok(Vec::new()) };
+        let known = self.known.get_or_insert_with(|| found.iter().filter(|one| !is_delivered(one)).cloned().collect());
+        known.retain(|one| found.iter().any(|other| is_same(one, other)));
+        Ok(found.into_iter().filter(|one| !known.iter().any(|other| is_same(one, other))).collect())
+    }
+
+    /// Searches once for a device that was set. `true` if it was unplugged.
+    ///
+    /// # Errors
+    /// Bus errors and Ctrl-C.
+    pub fn is_unplugged(&mut self, master: &mut Master<'_>, device: &FoundSlave) -> Result<bool, Failure> {
+        let Some(found) = look(master)? else { return Ok(false) };
+        let is_it = |other: &FoundSlave| match device.address {
+            Some(address) => other.address == Some(address),
+            None => other.node == device.node,
+        };
+        self.misses = if found.iter().any(is_it) { 0 } else { self.misses + 1 };
+        let is_gone = self.misses == MISSES;
+        if is_gone {
+            self.misses = 0;
+        }
+        Ok(is_gone)
+    }
+}
+
+/// The devices on the bus, a short time from now. `None` if a service was disturbed, for example by a device that is
+/// being plugged in.
+fn look(master: &mut Master<'_>) -> Result<Option<Vec<FoundSlave>>, Failure> {
+    // Without any device on the bus, no node acknowledges the requests.
+    master.set_tolerates_outages(true);
+    let paused = pause(master, master.now() + SEARCH_INTERVAL, Policy::Reconnect);
+    let found = paused.map_err(Failure::from).and_then(|()| scan(master, &mut |_| {}));
+    master.set_tolerates_outages(false);
+    match found {
+        Ok(found) => Ok(Some(found)),
+        Err(failure) if matches!(failure.kind(), Kind::Bus | Kind::Interrupted) => Err(failure),
+        Err(_) => Ok(None),
+    }
+}
+
+/// Gives a device without a node-ID its node-ID. It is addressed by its identity.
+///
+/// # Errors
+/// Those of [`assign`].
+pub fn assign_first(
+    master: &mut Master<'_>,
+    address: LssAddress,
+    id: NodeId,
+    overrides: &Overrides,
+    notify: &mut dyn FnMut(Note),
+) -> Result<(), Failure> {
+    let job = Job {
+        target: Target::Address(address),
+        id: Some(id),
+        rate: None,
+        store: true,
+        retime: false,
+        via: Via::Auto,
+        force: false,
+        descriptions: Descriptions { overrides, given: overrides.get(&id) },
+    };
+    assign(master, &job, notify).map(drop)
+}
