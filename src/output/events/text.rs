@@ -170,14 +170,9 @@ pub fn remark_text(remark: &Remark) -> String {
                 listed(nodes)
             ),
         },
-        Remark::NotStarted(nodes) => format!(
-            "{} {} not started, because only sensors are; start all nodes: log --start",
-            if nodes.len() == 1 { "node" } else { "nodes" },
-            match nodes.as_slice() {
-                [node] => format!("{node} was"),
-                nodes => format!("{} were", listed(nodes)),
-            }
-        ),
+        Remark::NotStarted(nodes) => {
+            format!("not started, because only sensors are: node {}; start all nodes: log --start", listed(nodes))
+        }
         Remark::NotOperational(node, silence) => {
             format!("node {node} left operational: {}", diagnosis::reason(silence))
         }
