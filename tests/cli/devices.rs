@@ -115,7 +115,7 @@ fn a_new_description_leaves_open_what_no_source_states() {
     fs::write(bench.path("new.toml"), &new).expect("written");
     bench.run("devices check new.toml").exit(0);
     assert!(
-        new.contains("# fill in the type of these 4 bytes: 0x0000C03F\n# [[object]]\n# at = \"0x2000:1\""),
+        new.contains("# fill in the type of these 4 bytes: 00 00 C0 3F\n# [[object]]\n# at = \"0x2000:1\""),
         "{new}"
     );
     let eds = "[ManufacturerObjects]\nSupportedObjects=1\n1=0x2000\n[2000]\nParameterName=Values\nObjectType=8\nSubNumber=2\n\
