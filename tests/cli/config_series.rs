@@ -71,6 +71,7 @@ const TEMPLATE: &str = "[device]\nkind = \"mh4\"\n[tpdo.1]\nevent-timer = \"{tim
 
 /// Runs `config apply --table t.csv f.toml --prompt` at a terminal, where this text is typed first. `None` if this
 /// computer has no program to make a terminal.
+#[allow(clippy::print_stderr, reason = "a skipped test must be visible")]
 fn at_terminal(bench: &Bench, typed: &str, end: bool) -> Option<super::Done> {
     std::fs::write(bench.path("f.toml"), TEMPLATE).expect("a file");
     let mut script = std::process::Command::new("script");

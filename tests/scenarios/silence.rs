@@ -474,7 +474,8 @@ fn watched_tpdo_of_another_length_is_reported_once_and_used_if_it_is_longer() {
     let frames: Vec<_> = (1..9).map(|step| (step * 500, "185#0000")).collect();
     assert_eq!(watched("", &frames), (0, vec!["TPDO1 2 of 5".to_owned(), "8 in total".to_owned()]));
     // Two producers.
-    let frames: Vec<_> = (1..9).map(|step| (step * 500, ["185#0000A03F00", longer][step as usize % 2])).collect();
+    let frames: Vec<_> =
+        (1..9).map(|step| (step * 500, if step % 2 == 0 { "185#0000A03F00" } else { longer })).collect();
     let (shown, reports) = watched("", &frames);
     assert_eq!((shown, reports.join("; ").as_str()), (4, "TPDO1 7 of 5, used; TPDO1 7 of 5; 4 in total"));
 }
