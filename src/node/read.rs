@@ -140,7 +140,7 @@ impl<'a, A: Ask> Reader<'a, A> {
     /// Reads optional objects. Those without a valid answer are recorded as unknown.
     ///
     /// # Errors
-    /// Like [`Reader::answers`].
+    /// A node does not answer any more; failures of the bus, and Ctrl-C.
     pub fn read_optional(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, A::Stop> {
         let results = self.read(objects)?;
         if let Some(error) = self.failed.values().next() {
@@ -158,7 +158,7 @@ impl<'a, A: Ask> Reader<'a, A> {
     /// The values of optional objects; `None` without a valid answer, or if the bytes do not fit the type.
     ///
     /// # Errors
-    /// Like [`Reader::answers`].
+    /// A node does not answer any more; failures of the bus, and Ctrl-C.
     pub fn values(&mut self, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
         let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
         let values = self.answers(&objects)?.into_iter().zip(items).map(|(answer, &(node, object, data_type))| {
