@@ -10,7 +10,7 @@ PSI = uint(0x00AB0000, 4)
 # A type that no source states is unknown.
 
 @case(TWO, rows=2, out=",0x2001:0,,,,0xE7FF", err="type of 0x2001:0 is unknown")
-@case("read 5 0x2001", 2, err=("received 0xE7FF", "0x2001:0/i16"), never="65511|-25")
+@case("read 5 0x2001", 2, err=("received E7 FF", "0x2001:0/i16"), never="65511|-25")
 @case("read 5 0x2001:0/i16", out="^-25$")
 @case("check 5 '0x2001:0 > 1000'", 2, err="type of 0x2001:0 is unknown", never="ok ")
 @case("check 5 '0x2001:0/i16 > 1000'", 1, out="FAIL")

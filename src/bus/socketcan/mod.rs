@@ -297,7 +297,7 @@ impl SocketCan {
             }
             CanFrame::Data(_) | CanFrame::Remote(_) => {
                 let frame = from_kernel(&message.frame)?;
-                if self.wanted.as_ref().is_some_and(|wanted| frame.is_remote() || !wanted.contains(&frame.id())) {
+                if self.wanted.as_ref().is_some_and(|wanted| !wanted.contains(&frame.id())) {
                     return None;
                 }
                 let event = Event::Frame(Received { frame, at });
