@@ -73,14 +73,10 @@ impl<'a, A: Ask> Reader<'a, A> {
                         let error = result.as_ref().err().cloned();
                         silences.entry(node).or_insert_with(|| (error.expect("an error"), 0)).1 += 1;
                     }
-                    // Late answers of one device can look like answers of two.
-                    Err(SdoFailure::TwoDevices(None)) => {}
-                    Err(SdoFailure::TwoDevices(Some(_)) | SdoFailure::NotWritten(_)) => {
-                        if !self.master.tolerates_two_devices() {
-                            self.failed.extend(result.as_ref().err().map(|error| (node, error.clone())));
-                        }
-                    }
-                    Err(SdoFailure::Overtime(_)) => {
+                    // `None` may be late answers of one device.
+                    Err(SdoFailure::TwoDevices(Some(_)) | SdoFailure::NotWritten(_))
+                        if self.master.tolerates_two_devices() => {}
+                    Err(SdoFailure::TwoDevices(Some(_)) | SdoFailure::NotWritten(_) | SdoFailure::Overtime(_)) => {
                         self.failed.extend(result.as_ref().err().map(|error| (node, error.clone())));
                     }
                     Ok(_) | Err(SdoFailure::Refused(_) | SdoFailure::Fit(_)) => {
