@@ -76,6 +76,9 @@ _cangauge() {
             cangauge,pdo)
                 cmd="cangauge__subcmd__pdo"
                 ;;
+            cangauge,plot)
+                cmd="cangauge__subcmd__plot"
+                ;;
             cangauge,read)
                 cmd="cangauge__subcmd__read"
                 ;;
@@ -258,6 +261,9 @@ _cangauge() {
                 ;;
             cangauge__subcmd__help,pdo)
                 cmd="cangauge__subcmd__help__subcmd__pdo"
+                ;;
+            cangauge__subcmd__help,plot)
+                cmd="cangauge__subcmd__help__subcmd__plot"
                 ;;
             cangauge__subcmd__help,read)
                 cmd="cangauge__subcmd__help__subcmd__read"
@@ -539,7 +545,7 @@ _cangauge() {
 
     case "${cmd}" in
         cangauge)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version scan ls read nmt sdo log check lss info status unit filter limits minmax errors bus pdo config autozero zero tare store restore sim doctor objects export devices completions help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version scan ls read nmt sdo log check lss info status unit filter limits minmax errors bus pdo config autozero zero tare store restore sim doctor objects export plot devices completions help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 1 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2481,7 +2487,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__help)
-            opts="scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help"
+            opts="scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export plot devices completions help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3183,6 +3189,20 @@ _cangauge() {
         cangauge__subcmd__help__subcmd__pdo__subcmd__watch)
             opts=""
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
+        cangauge__subcmd__help__subcmd__plot)
+            opts=""
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
             fi
@@ -5713,6 +5733,104 @@ _cangauge() {
                     ;;
                 -d)
                     COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
+        cangauge__subcmd__plot)
+            opts="-o -s -b -t -f -q -v -h -V --output --signal --events --from --to --elapsed --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                --output)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -o)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --signal)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -s)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --events)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --from)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --to)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --bus)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -b)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --timeout)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -t)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --retries)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --format)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                -f)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                --wait)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --trace)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --progress)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
+                --color)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
                     return 0
                     ;;
                 *)

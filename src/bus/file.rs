@@ -1,11 +1,33 @@
 //! Queries about open files: which process has the lock, whether the file was renamed or deleted, whether a FIFO has a
-//! reader.
+//! reader. Reads compressed files.
 
 use super::interrupt::Interrupts;
+use flate2::bufread::MultiGzDecoder;
 use std::fs::{File, Metadata, TryLockError};
-use std::io;
+use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 use std::time::{Duration, Instant};
+
+/// The first bytes of a gzip file.
+pub(super) const GZIP: &[u8] = b"\x1f\x8b";
+
+/// The size of the buffer of a file that is read as a whole.
+const BUFFER_SIZE: usize = 1 << 18;
+
+/// Opens a file to read its text; `-` is standard input. A file of gzip is unpacked.
+///
+/// # Errors
+/// The file cannot be opened or read.
+pub fn open_text(path: &Path) -> io::Result<Box<dyn BufRead>> {
+    let mut reader: Box<dyn BufRead> = match path.to_str() {
+        Some("-") => Box::new(BufReader::with_capacity(BUFFER_SIZE, io::stdin())),
+        _ => Box::new(BufReader::with_capacity(BUFFER_SIZE, File::open(path)?)),
+    };
+    if !reader.fill_buf()?.starts_with(GZIP) {
+        return Ok(reader);
+    }
+    Ok(Box::new(BufReader::with_capacity(BUFFER_SIZE, MultiGzDecoder::new(reader))))
+}
 
 /// Another open file of the same inode has the lock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -94,6 +94,25 @@ pub struct Stamp {
     pub wall: Wall,
 }
 
+/// The microseconds that the local time of the host is ahead of UTC, `at` microseconds after 1970; 0 if that is unknown.
+#[cfg(unix)]
+#[allow(unsafe_code)]
+pub fn ahead_of_utc(at: i64) -> i64 {
+    #[allow(clippy::cast_possible_truncation, clippy::unnecessary_cast)]
+    let seconds = at.div_euclid(1_000_000) as libc::time_t;
+    // SAFETY: `tm` is a plain C structure for which zero is a valid value in every field.
+    let mut fields: libc::tm = unsafe { std::mem::zeroed() };
+    // SAFETY: `localtime_r` reads and writes only the values that it is given.
+    let is_known = unsafe { !libc::localtime_r(&raw const seconds, &raw mut fields).is_null() };
+    if is_known { i64::from(fields.tm_gmtoff) * 1_000_000 } else { 0 }
+}
+
+/// Time zones are unknown on this system.
+#[cfg(not(unix))]
+pub fn ahead_of_utc(_: i64) -> i64 {
+    0
+}
+
 /// A duration as text for users: `500 ms`, `5 s`, `2.5 s`, `1h 30m`.
 pub fn format_duration(length: Duration) -> String {
     let milliseconds = length.as_millis();

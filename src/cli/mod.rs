@@ -27,6 +27,7 @@ mod open;
 mod own;
 pub mod parse;
 mod pdo;
+mod plot;
 mod read;
 mod recording;
 mod scan;
@@ -44,7 +45,6 @@ use crate::output;
 use crate::output::console::Console;
 pub(crate) use crate::output::failure::ErrorMessage;
 use crate::output::notes::undone_text;
-
 use crate::output::report::{Format, Report, Stream, render};
 use crate::tasks::journal::Journal;
 use anstream::ColorChoice;
@@ -258,6 +258,7 @@ commands! {
     Doctor(doctor::Doctor): "doctor";
     Objects(objects::Objects): "objects";
     Export(export::Export): "export";
+    Plot(plot::Plot): "plot";
     Devices(devices::Devices): "devices";
     Completions(completions::Completions): "completions";
 }
@@ -302,9 +303,7 @@ impl Command {
         };
         if writes { OnTwoDevices::RefuseWrites } else { OnTwoDevices::Fail }
     }
-}
 
-impl Command {
     /// Whether the command changes devices in a way that affects later commands.
     fn changes_devices(&self) -> bool {
         match self {

@@ -5,6 +5,7 @@
 pub mod decode;
 pub mod expression;
 pub mod histogram;
+pub mod interval;
 pub mod layout;
 pub mod reading;
 pub mod sample;

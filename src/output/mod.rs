@@ -27,8 +27,10 @@ pub mod nmt;
 pub mod notes;
 pub mod objects;
 pub mod pdo;
+pub mod plot;
 pub mod progress;
 pub mod read;
+pub mod recording;
 pub mod replay;
 pub mod report;
 pub mod rows;
@@ -40,3 +42,8 @@ pub mod summary;
 pub mod table;
 pub mod text;
 pub mod verdict;
+
+/// The width of the terminal on stdout in characters; 80 without a terminal.
+pub fn terminal_width() -> usize {
+    terminal_size::terminal_size_of(std::io::stdout()).map_or(80, |(width, _)| usize::from(width.0))
+}

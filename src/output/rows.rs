@@ -23,6 +23,7 @@ pub use format::{CHOICES, FileFormat, HeaderMismatch};
 pub use line_writer::{LineWriter, QUEUE_CAPACITY};
 pub use resume::{ExistingLines, existing_lines};
 pub use rotation::Rotation;
+pub(super) use row::LONG_COLUMNS;
 use row::{Columns, Values};
 pub use series::Series;
 pub use setup::{Layout, Setup};

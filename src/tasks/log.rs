@@ -8,7 +8,6 @@ mod checks;
 mod events;
 mod failure;
 mod heartbeats;
-mod interval;
 mod passive;
 mod poll;
 mod producer;

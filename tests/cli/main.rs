@@ -27,6 +27,7 @@ mod lss;
 mod nmt;
 mod output;
 mod pdo;
+mod plot;
 mod profiles;
 mod read;
 mod readme;

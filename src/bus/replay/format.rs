@@ -136,7 +136,7 @@ impl FileFormat {
     /// The format of a binary file by its first bytes; `None` for other formats.
     pub(super) fn of(start: &[u8]) -> Option<FileFormat> {
         let magic: [(&[u8], FileFormat); 17] = [
-            (super::lines::GZIP, FileFormat::Gzip),
+            (crate::bus::file::GZIP, FileFormat::Gzip),
             (b"\xfd7zXZ", FileFormat::Xz),
             (b"BZh", FileFormat::Bzip2),
             (b"\x28\xb5\x2f\xfd", FileFormat::Zstd),

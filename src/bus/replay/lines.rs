@@ -1,5 +1,6 @@
 //! Reads the lines of a recording from a file or a pipe, compressed or not.
 
+use crate::bus::file::GZIP;
 use flate2::bufread::MultiGzDecoder;
 use std::collections::VecDeque;
 use std::fs::File;
@@ -10,9 +11,6 @@ const MAX_LINE: u64 = 4096;
 
 /// The first bytes of a file, which show its format.
 const START_LENGTH: u64 = 16;
-
-/// The first bytes of a gzip file.
-pub(super) const GZIP: &[u8] = b"\x1f\x8b";
 
 /// A mark that some editors write at the start of a UTF-8 file.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";

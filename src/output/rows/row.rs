@@ -100,7 +100,8 @@ pub(super) enum Columns<'a> {
 }
 
 /// The columns of layout `long`.
-pub(super) const LONG_COLUMNS: [&str; 8] = ["time", "elapsed_s", "node", "signal", "value", "unit", "status", "raw"];
+pub(in crate::output) const LONG_COLUMNS: [&str; 8] =
+    ["time", "elapsed_s", "node", "signal", "value", "unit", "status", "raw"];
 
 impl Columns<'_> {
     /// The names, in their order.

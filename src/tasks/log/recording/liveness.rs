@@ -1,11 +1,11 @@
 //! Tracks which of the recorded nodes still send.
 
 use super::super::heartbeats::{HeartbeatChange, HeartbeatMonitor};
-use super::super::interval::IntervalTracker;
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::Life;
 use crate::canopen::pdo::Transmission;
+use crate::measure::interval::IntervalTracker;
 use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use crate::tasks::log::Mode;

@@ -1,9 +1,9 @@
 //! Counts and statistics of a recording.
 
 use super::super::events::EventCounts;
-use super::super::interval::IntervalTracker;
 use super::super::producer::SyncStatistics;
 use crate::bus::Mono;
+use crate::measure::interval::IntervalTracker;
 use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use std::time::Duration;

@@ -14,7 +14,7 @@ const MIN_SILENCE: Duration = Duration::from_secs(1);
 
 /// The usual interval of a message, and the time of the last one.
 #[derive(Clone, Debug, Default)]
-pub(super) struct IntervalTracker {
+pub struct IntervalTracker {
     last: Option<Mono>,
     usual: Option<Duration>,
 }
@@ -22,7 +22,7 @@ pub(super) struct IntervalTracker {
 impl IntervalTracker {
     /// Adds a message received at `now`. Returns the interval since the last message if it is a gap. Without `max_gap`,
     /// a gap is longer than three usual intervals.
-    pub(super) fn add(&mut self, now: Mono, max_gap: Option<Duration>) -> Option<Duration> {
+    pub fn add(&mut self, now: Mono, max_gap: Option<Duration>) -> Option<Duration> {
         let mut gap = None;
         if let Some(last) = self.last.filter(|&last| last < now) {
             let interval = now.since(last);
@@ -40,23 +40,23 @@ impl IntervalTracker {
     }
 
     /// Whether a message was received so far.
-    pub(super) fn has_received(&self) -> bool {
+    pub fn has_received(&self) -> bool {
         self.last.is_some()
     }
 
     /// The time since the last message, if it is longer than usual.
-    pub(super) fn silence(&self, now: Mono) -> Option<Duration> {
+    pub fn silence(&self, now: Mono) -> Option<Duration> {
         let limit = (self.usual.unwrap_or_default() * SILENCE_FACTOR).max(MIN_SILENCE);
         self.last.map(|last| now.since(last)).filter(|&silence| silence > limit)
     }
 
     /// Whether no message was received so far, or none for longer than usual.
-    pub(super) fn is_lost(&self, now: Mono) -> bool {
+    pub fn is_lost(&self, now: Mono) -> bool {
         self.last.is_none() || self.silence(now).is_some()
     }
 
     /// Measures silence from now on, because nothing could be received before.
-    pub(super) fn restart(&mut self, now: Mono) {
+    pub fn restart(&mut self, now: Mono) {
         self.last = self.last.map(|_| now);
     }
 }

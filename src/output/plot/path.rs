@@ -1,0 +1,151 @@
+//! Reduces a curve to the points that a plot of limited width can show, and breaks it at gaps.
+
+use super::Point;
+use crate::bus::Mono;
+use crate::measure::interval::IntervalTracker;
+use std::time::Duration;
+
+/// The values of one column of pixels: the first, the lowest, the highest and the last, each with its position.
+#[derive(Clone, Copy, Debug)]
+struct Reduced {
+    points: [(f64, f64); 4],
+    column: f64,
+}
+
+impl Reduced {
+    fn new(at: (f64, f64)) -> Reduced {
+        Reduced { points: [at; 4], column: at.0.floor() }
+    }
+
+    fn add(&mut self, at: (f64, f64)) {
+        let [_, low, high, last] = &mut self.points;
+        if at.1 < low.1 {
+            *low = at;
+        }
+        if at.1 > high.1 {
+            *high = at;
+        }
+        *last = at;
+    }
+
+    fn push_to(mut self, path: &mut Vec<(f64, f64)>) {
+        self.points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        path.extend(self.points);
+        path.dedup();
+    }
+}
+
+/// The connected parts of a curve. `x` is the column of a time; a gap is shown only if it is as wide as a column.
+pub(super) fn paths(points: &[Point], x: impl Fn(i64) -> f64) -> Vec<Vec<(f64, f64)>> {
+    let (mut paths, mut path, mut open): (Vec<Vec<(f64, f64)>>, Vec<(f64, f64)>, Option<Reduced>) = Default::default();
+    let mut intervals = IntervalTracker::default();
+    let start = points.first().map_or(0, |point| point.at);
+    for point in points {
+        let since_start = Duration::from_micros(u64::try_from(point.at - start).unwrap_or(0));
+        let is_gap = intervals.add(Mono::at(since_start), None).is_some();
+        let at = (x(point.at), point.value);
+        let is_visible = open.is_some_and(|open| at.0 - open.points[3].0 >= 1.0);
+        if !point.value.is_finite() || is_gap && is_visible {
+            if let Some(open) = open.take() {
+                open.push_to(&mut path);
+            }
+            if !path.is_empty() {
+                paths.push(std::mem::take(&mut path));
+            }
+        }
+        if !point.value.is_finite() {
+            continue;
+        }
+        match &mut open {
+            Some(column) if column.column == at.0.floor() => column.add(at),
+            _ => {
+                if let Some(column) = open.replace(Reduced::new(at)) {
+                    column.push_to(&mut path);
+                }
+            }
+        }
+    }
+    if let Some(open) = open {
+        open.push_to(&mut path);
+    }
+    paths.extend((!path.is_empty()).then_some(path));
+    paths
+}
+
+/// The drawn parts of a dashed line. `pattern` has the lengths of lines and spaces in turn.
+pub(super) fn dashes(path: &[(f64, f64)], pattern: &[f64]) -> Vec<Vec<(f64, f64)>> {
+    let Some(&first) = path.first().filter(|_| !pattern.is_empty()) else { return vec![path.to_vec()] };
+    let (mut drawn, mut part) = (Vec::new(), vec![first]);
+    let (mut index, mut left) = (0, pattern[0]);
+    for pair in path.windows(2) {
+        let (mut from, to) = (pair[0], pair[1]);
+        loop {
+            let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+            let length = dx.hypot(dy);
+            if length < left {
+                left -= length;
+                part.push(to);
+                break;
+            }
+            from = (from.0 + dx * left / length, from.1 + dy * left / length);
+            part.push(from);
+            if index % 2 == 0 {
+                drawn.push(std::mem::take(&mut part));
+            }
+            part = vec![from];
+            index = (index + 1) % pattern.len();
+            left = pattern[index];
+        }
+    }
+    drawn.extend((index % 2 == 0).then_some(part));
+    drawn
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(values: &[(i64, f64)]) -> Vec<Point> {
+        values.iter().map(|&(at, value)| Point { at, value, status: None }).collect()
+    }
+
+    #[test]
+    fn columns_keep_first_lowest_highest_and_last() {
+        let many: Vec<(i64, f64)> = (0..1000).map(|at| (at, if at == 501 { 9.0 } else { (at % 7) as f64 })).collect();
+        let found = paths(&points(&many), |at| at as f64 / 500.0);
+        assert_eq!(found.len(), 1);
+        assert!(found[0].len() <= 8, "{found:?}");
+        assert!(found[0].contains(&(1.002, 9.0)), "{found:?}");
+        assert_eq!((found[0][0], found[0][found[0].len() - 1]), ((0.0, 0.0), (1.998, 5.0)));
+    }
+
+    #[test]
+    fn gaps_and_missing_values_break_the_line() {
+        let seconds = |times: &[i64]| -> Vec<(i64, f64)> { times.iter().map(|at| (at * 1_000_000, 1.0)).collect() };
+        let mut curve = points(&seconds(&[0, 1, 2, 3, 20, 21, 22, 23]));
+        let lengths = |curve: &[Point], second: f64| -> Vec<usize> {
+            paths(curve, |at| at as f64 / 1e6 * second).iter().map(Vec::len).collect()
+        };
+        assert_eq!(lengths(&curve, 10.0), [4, 4]);
+        assert_eq!(lengths(&curve, 0.01).len(), 1, "not visible");
+        curve[1].value = f64::NAN;
+        assert_eq!(lengths(&curve, 10.0), [1, 2, 4], "a single value is kept");
+        // A sender that becomes slower for good is not a row of gaps.
+        let slower = points(&seconds(&[0, 1, 2, 3, 5, 7, 9, 12, 15, 18, 21]));
+        assert_eq!(lengths(&slower, 10.0), [11]);
+        assert!(paths(&[], |_| 0.0).is_empty());
+    }
+
+    #[test]
+    fn dashes_follow_the_line() {
+        let found = dashes(&[(0.0, 0.0), (10.0, 0.0)], &[4.0, 2.0]);
+        assert_eq!(
+            found,
+            [vec![(0.0, 0.0), (4.0, 0.0)], vec![(6.0, 0.0), (10.0, 0.0)], vec![(10.0, 0.0)]][..2].to_vec()
+        );
+        let corner = dashes(&[(0.0, 0.0), (3.0, 0.0), (3.0, 3.0)], &[4.0, 9.0]);
+        assert_eq!(corner, [vec![(0.0, 0.0), (3.0, 0.0), (3.0, 1.0)]]);
+        assert_eq!(dashes(&[(1.0, 2.0)], &[4.0, 2.0]), [[(1.0, 2.0)]]);
+        assert_eq!(dashes(&[(1.0, 2.0), (5.0, 2.0)], &[]).len(), 1);
+    }
+}
