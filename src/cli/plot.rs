@@ -30,7 +30,7 @@ Examples:
   cangauge plot run.csv -o run.svg
   cangauge plot run.csv --events events.csv --signal pressure --from 14:30 --to 14:45
   cangauge plot run-*.csv --elapsed --to 10m -o run.png
-  cangauge -b sim log 1 --sync 100ms --count 200 | cangauge plot -")]
+  cangauge log 1 --duration 10s | cangauge plot -")]
 pub(crate) struct Plot {
     /// Files of log: CSV or JSON Lines, also compressed with gzip; - for stdin. run.csv stands for run-0001.csv and so
     /// on if it does not exist

@@ -72,7 +72,7 @@ fn wrong_files_and_options() {
     bench
         .run("plot run.csv --elapsed --from 12:00")
         .refuses("with --elapsed, --from and --to are times since the start: 10m");
-    bench.run("plot run.csv --format json").refuses("a plot is a picture: omit --format");
+    bench.run("plot run.csv --format csv").refuses("a plot is a picture: omit --format");
 }
 
 #[test]
