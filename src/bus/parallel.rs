@@ -42,6 +42,7 @@ pub fn in_parallel<T: Send, R: Send>(
                 timestamps: bus.timestamps(),
                 is_live: bus.is_live(),
                 waits: bus.waits(),
+                sends_remote_frames: bus.sends_remote_frames(),
                 bit_rate: bus.bit_rate(),
                 last: Cell::new(bus.now()),
                 calls,
@@ -77,6 +78,7 @@ struct Share {
     timestamps: TimestampSource,
     is_live: bool,
     waits: bool,
+    sends_remote_frames: bool,
     bit_rate: Option<u32>,
     /// The last known moment.
     last: Cell<Stamp>,
@@ -114,6 +116,10 @@ impl Bus for Share {
 
     fn waits(&self) -> bool {
         self.waits
+    }
+
+    fn sends_remote_frames(&self) -> bool {
+        self.sends_remote_frames
     }
 
     fn now(&self) -> Stamp {

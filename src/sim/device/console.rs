@@ -10,7 +10,7 @@ pub(super) struct Remembered {
 }
 
 impl Device {
-    /// The same device with what it has stored in this file, where it stores from now on.
+    /// Loads the non-volatile memory of the device from a file. The device then stores it there.
     pub(in crate::sim) fn remembering(mut self, file: StateFile) -> Device {
         let Memory { settings, objects, .. } = &mut self.memory;
         if let Some(stored) = file.get(&self.setup.model.description.name, self.setup.serial) {

@@ -2,6 +2,7 @@
 
 use super::problem::Problem;
 use super::setting::{Form, Scale, Setting};
+use crate::bus::remote::bit_rate;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::{MappingEntry, Transmission};
 use crate::canopen::value::{DataType, Value};
@@ -158,7 +159,7 @@ impl Setting {
             }
             Form::BitRate => {
                 let Item::Text(text) = item else { return Err(wrong("a bit rate in quotes (\"250k\")")) };
-                let rate = bit_rate(text).ok_or_else(|| Problem::NotABitRate { text: text.clone() })?;
+                let rate = bit_rate(text).map_err(|_| Problem::NotABitRate { text: text.clone() })?;
                 Ok(Some(Content::Number(rate)))
             }
         }
@@ -335,14 +336,4 @@ fn mapping(node: &Node, item: &Item) -> Result<Content, Problem> {
     let entries: Vec<MappingEntry> = list.iter().map(entry).collect::<Result<_, _>>()?;
     let bits: u32 = entries.iter().map(|entry| u32::from(entry.bits)).sum();
     if bits > 64 { Err(Problem::Bits { bits }) } else { Ok(Content::Mapping(entries)) }
-}
-
-fn bit_rate(text: &str) -> Option<u32> {
-    let (number, factor) = match (text.strip_suffix('k'), text.strip_suffix('M')) {
-        (Some(number), _) => (number, 1000),
-        (None, Some(number)) => (number, 1_000_000),
-        (None, None) => (text, 1),
-    };
-    let rate = number.parse::<u32>().ok()?.checked_mul(factor)?;
-    (1_000..=1_000_000).contains(&rate).then_some(rate)
 }
