@@ -4,8 +4,7 @@ use crate::bus::{Mono, Stamp};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtState};
 use crate::canopen::value::DataType;
-use crate::master::{Error, Happening, Master};
-use crate::node::read::read_values;
+use crate::master::{Answer, Error, Happening, Master, Request, SdoError, Ticket};
 use crate::node::state::HEARTBEAT_TIME;
 use crate::node::wait::{Policy, Until, Waiter, run};
 use std::collections::BTreeMap;
@@ -52,22 +51,19 @@ pub fn watch(
     until: Option<Mono>,
     on_change: &mut dyn FnMut(&StateEvent) -> ControlFlow<()>,
 ) -> Result<(), Error> {
-    let mut heartbeats: BTreeMap<NodeId, Heartbeat> = nodes.iter().map(|&node| (node, Heartbeat::default())).collect();
-    if ask {
-        let items: Vec<_> = nodes.iter().map(|&node| (node, HEARTBEAT_TIME, DataType::Unsigned(2))).collect();
-        for (node, value) in nodes.iter().zip(read_values(master, &items)?) {
-            let period = value.ok().and_then(|value| value.as_u64()).filter(|&time| time > 0);
-            if let Some(heartbeat) = heartbeats.get_mut(node) {
-                heartbeat.period = period.map(Duration::from_millis);
-            }
-        }
-    }
+    let heartbeats = nodes.iter().map(|&node| (node, Heartbeat::default())).collect();
+    let asked = if ask { nodes } else { &[] };
+    let reads = asked.iter().map(|&node| (master.start(Request::read(node, HEARTBEAT_TIME)), node)).collect();
     let end = until.unwrap_or(Mono::at(Duration::MAX));
-    run(master, Policy::Observe, &mut Watcher { heartbeats, end, on_change })
+    let result = run(master, Policy::Observe, &mut Watcher { heartbeats, reads, end, on_change });
+    master.cancel();
+    result
 }
 
 struct Watcher<'a> {
     heartbeats: BTreeMap<NodeId, Heartbeat>,
+    /// The reads of 1017h, while frames are already watched.
+    reads: BTreeMap<Ticket, NodeId>,
     end: Mono,
     on_change: &'a mut dyn FnMut(&StateEvent) -> ControlFlow<()>,
 }
@@ -76,6 +72,16 @@ impl Watcher<'_> {
     /// The end, or the moment at which the next node is lost.
     fn deadline(&self) -> Mono {
         self.heartbeats.values().filter_map(Heartbeat::lost_at).min().map_or(self.end, |at| at.min(self.end))
+    }
+
+    /// Takes the heartbeat time of a node from the answer to its read.
+    fn on_answer(&mut self, ticket: Ticket, result: Result<Answer, SdoError>) {
+        let Some(node) = self.reads.remove(&ticket) else { return };
+        let value = result.and_then(|answer| answer.value(node, HEARTBEAT_TIME, Some(DataType::Unsigned(2))));
+        let period = value.ok().and_then(|(value, _)| value.as_u64()).filter(|&time| time > 0);
+        if let (Some(heartbeat), Some(period)) = (self.heartbeats.get_mut(&node), period) {
+            heartbeat.period = Some(Duration::from_millis(period));
+        }
     }
 
     /// The node whose heartbeat is overdue.
@@ -103,6 +109,10 @@ impl Waiter for Watcher<'_> {
                 let change = self.heartbeats.get_mut(&node)?.on_life(life, received.at.mono)?;
                 Some(StateEvent { at: received.at, node, change })
             }),
+            Happening::Sdo(ticket, result) => {
+                self.on_answer(ticket, result);
+                None
+            }
             Happening::Deadline if self.deadline() >= self.end => return Ok(ControlFlow::Break(())),
             Happening::Deadline => self.lost(master.bus().now()),
             Happening::Interrupted | Happening::Ended => return Ok(ControlFlow::Break(())),

@@ -33,14 +33,11 @@ pub(super) fn watched(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
             None => violations.push(("reports what was received", format!("{seen:?} of {lives:?}"))),
         }
     }
-    // Frames that arrive while the heartbeat times are read are not watched yet. If that read fails, none are.
     if run.result.is_err() {
         return;
     }
-    let asked = run.bus.all_sent().last().map(|(at, _)| *at + Duration::from_millis(spec.timeout_ms));
-    let from = asked.unwrap_or(run.started);
     let mut before: BTreeMap<NodeId, NmtState> = BTreeMap::new();
-    for (at, node, life) in lives.iter().filter(|(at, ..)| *at > from) {
+    for (at, node, life) in lives.iter().filter(|(at, ..)| *at > run.started) {
         let is_news = match life {
             Life::BootUp => {
                 before.remove(node);
