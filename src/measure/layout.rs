@@ -3,12 +3,13 @@
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
-use crate::canopen::value::DataType;
+use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::Model;
 use crate::device::dictionary::spellings;
 use crate::device::scale::{Markers, Scale, StatusBits};
 use crate::device::unit::Unit;
 use crate::device::{profiles, standard};
+use crate::measure::sample::Number;
 
 /// One measured signal of a node.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +30,8 @@ pub struct Signal {
     pub unit: Option<Unit>,
     /// The decimal digits (6132h); `None` if they are unknown.
     pub digits: Option<u8>,
+    /// Whether the object with the decimal digits, or with the step, gave no valid answer. Then an integer has no value.
+    pub lacks_scale: bool,
     /// Scaling and status of a signal that does not follow CiA 404.
     pub rules: Rules,
     /// The measuring range of the device.
@@ -99,6 +102,13 @@ impl Signal {
             || self.has_channel()
                 && object.sub == self.channel
                 && PROCESS_VALUES.iter().any(|&(index, _)| index == object.index)
+    }
+
+    /// The number of a value: an integer has the decimal digits of the signal. `None` for text, and for an integer whose
+    /// scale is unknown.
+    pub fn number(&self, value: &Value) -> Option<Number> {
+        let is_integer = matches!(value, Value::Integer(_) | Value::Unsigned(_));
+        Number::from_value(value, self.digits.unwrap_or(0)).filter(|_| !(is_integer && self.lacks_scale))
     }
 
     /// Whether the signal is a CiA 404 channel.

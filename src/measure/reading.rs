@@ -31,6 +31,19 @@ enum Scaling {
     Digits(Option<u8>),
     /// The number has a factor and an offset.
     Fixed(Scale),
+    /// The decimal digits, or the step, could not be read.
+    Unread,
+}
+
+impl Scaling {
+    fn of(signal: &Signal) -> Scaling {
+        match signal.rules.scaling {
+            _ if signal.lacks_scale => Scaling::Unread,
+            Rule::Digits => Scaling::Digits(signal.digits),
+            Rule::Plain => Scaling::Plain,
+            Rule::Fixed(scale) => Scaling::Fixed(scale),
+        }
+    }
 }
 
 /// More decimal digits are impossible: CiA 404 has 0 to 9.
@@ -49,11 +62,7 @@ impl Reading {
             source,
             channel: Some(signal.channel),
             data_type,
-            scaling: match signal.rules.scaling {
-                Rule::Digits => Scaling::Digits(signal.digits),
-                Rule::Plain => Scaling::Plain,
-                Rule::Fixed(scale) => Scaling::Fixed(scale),
-            },
+            scaling: Scaling::of(signal),
             rules: signal.rules.clone(),
             has_marker: signal.has_marker,
             has_status: signal.status.is_some(),
@@ -69,7 +78,11 @@ impl Reading {
             let has_status = signal.status.is_some() || !signal.is_value(object);
             return Reading { has_status, ..Reading::of_signal(signal, data_type, source) };
         }
-        let scaling = layout.signal_of(object).map_or(Scaling::Plain, |signal| Scaling::Digits(signal.digits));
+        let scaling = match layout.signal_of(object) {
+            Some(signal) if signal.lacks_scale => Scaling::Unread,
+            Some(signal) => Scaling::Digits(signal.digits),
+            None => Scaling::Plain,
+        };
         Reading { scaling, ..Reading::plain(data_type, source) }
     }
 
@@ -105,7 +118,8 @@ impl Reading {
                 let digits = digits.filter(|digits| *digits <= MAX_DIGITS)?;
                 Some(Scale { factor: Decimal::new(1, digits), ..plain })
             }
-            Scaling::Plain | Scaling::Digits(_) => Some(plain),
+            Scaling::Unread if is_integer => None,
+            Scaling::Plain | Scaling::Digits(_) | Scaling::Unread => Some(plain),
         }
     }
 
@@ -123,9 +137,10 @@ impl Reading {
             Scaling::Digits(Some(digits)) if digits > MAX_DIGITS && is_integer => {
                 return Some(without_value(Some(Status::Invalid), Some(Doubt::ImpossibleDigits(digits))));
             }
+            Scaling::Unread if is_integer => return Some(without_value(None, Some(Doubt::UnreadScale))),
             Scaling::Digits(None) if is_integer => (0, Some(Doubt::UnknownDigits)),
             Scaling::Digits(digits) => (digits.unwrap_or(0), None),
-            Scaling::Plain | Scaling::Fixed(_) => (0, None),
+            Scaling::Plain | Scaling::Fixed(_) | Scaling::Unread => (0, None),
         };
         let unscaled = Number::from_value(&value, digits)?;
         let number = if let Scaling::Fixed(scale) = self.scaling { unscaled.scaled(scale)? } else { unscaled };
@@ -252,6 +267,7 @@ mod tests {
             has_marker: false,
             unit: None,
             digits,
+            lacks_scale: false,
             rules: Rules::default(),
             range,
         }
@@ -324,6 +340,10 @@ mod tests {
             assert_eq!(sample(&signal(Some(digits), UNKNOWN), I32, &[1, 0, 0, 0], Some(0)), (String::new(), "invalid"));
         }
         assert_eq!(sample(&signal(None, UNKNOWN), I32, &[57, 48, 0, 0], Some(0)), ("12345".into(), ""));
+        // 6132h gave no valid answer: an integer is wrong by a power of ten, a REAL32 is not.
+        let unread = Signal { lacks_scale: true, ..signal(None, UNKNOWN) };
+        assert_eq!(sample(&unread, I32, &[57, 48, 0, 0], Some(0)), (String::new(), ""));
+        assert_eq!(sample(&unread, DataType::Real32, &[0, 0, 0x48, 0x41], Some(0)), ("12.5".into(), "ok"));
         // INTEGER32 values read as REAL32: 12345, 12345678.
         for bytes in [[57, 48, 0, 0], [0x4e, 0x61, 0xbc, 0]] {
             let found = sample(&signal(Some(3), UNKNOWN), DataType::Real32, &bytes, Some(0));

@@ -208,6 +208,8 @@ pub enum Doubt {
     ImpossibleDigits(u8),
     /// The decimal digits (6132h) are unknown. The value is the integer.
     UnknownDigits,
+    /// The object with the decimal digits, or with the step, gave no valid answer. There is no value.
+    UnreadScale,
     /// The bytes are a REAL32 close to zero, and are probably an integer. There is no value.
     LooksLikeInteger,
     /// The value is at the end of its integer type, and the measuring range is unknown. The value is kept.

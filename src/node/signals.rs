@@ -25,6 +25,7 @@ pub(crate) fn described(node: &Node, entry: &SignalEntry) -> Signal {
         has_marker: entry.marker,
         unit: entry.fixed_unit,
         digits: None,
+        lacks_scale: false,
         rules,
         range: if entry.may_clip { MeasuringRange::MayClip } else { MeasuringRange::Unknown },
     }
@@ -50,6 +51,7 @@ fn plain(node: &Node, object: ObjectId) -> Signal {
         has_marker: false,
         unit: layout.unit_of(object),
         digits: None,
+        lacks_scale: false,
         rules: Rules::plain(),
         range: MeasuringRange::Unknown,
     }

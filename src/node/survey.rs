@@ -384,17 +384,24 @@ fn read_units<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<
         .iter()
         .flat_map(|&(at, _, objects)| objects.into_iter().flatten().map(move |object| (at, object)))
         .collect();
-    let items: Vec<Item> = objects
-        .iter()
-        .map(|&(at, object)| {
-            let node = &nodes[at];
-            (node.id, object, node.layout().data_type(object).unwrap_or(if object.index == 0x6131 { U32 } else { U8 }))
-        })
-        .collect();
-    let values: BTreeMap<(usize, ObjectId), Option<Value>> = objects.into_iter().zip(reader.values(&items)?).collect();
+    let items: Vec<(NodeId, ObjectId)> = objects.iter().map(|&(at, object)| (nodes[at].id, object)).collect();
+    let mut values: BTreeMap<(usize, ObjectId), Value> = BTreeMap::new();
+    let mut refused: BTreeSet<(usize, ObjectId)> = BTreeSet::new();
+    for ((at, object), answer) in objects.into_iter().zip(reader.read_optional(&items)?) {
+        let node = &nodes[at];
+        let or_else = if object.index == 0x6131 { U32 } else { U8 };
+        let data_type = node.layout().data_type(object).unwrap_or(or_else);
+        match answer.and_then(|answer| answer.value(node.id, object, Some(data_type))) {
+            Ok((value, _)) => drop(values.insert((at, object), value)),
+            Err(SdoError { failure: SdoFailure::Refused(_), .. }) => drop(refused.insert((at, object))),
+            Err(_) => {}
+        }
+    }
     for (at, number, objects) in wanted {
+        let is_unread = |object: &ObjectId| !values.contains_key(&(at, *object)) && !refused.contains(&(at, *object));
+        let lacks_scale = objects[1..].iter().flatten().any(is_unread);
         let [unit, digits, step] =
-            objects.map(|object| object.and_then(|object| self::number(values.get(&(at, object))?.as_ref())));
+            objects.map(|object| object.and_then(|object| self::number(values.get(&(at, object)))));
         let node = &mut nodes[at];
         let step = signals::step(node, &node.signals[number]).zip(Some(step));
         let fixed = node.fixed_unit(node.signals[number].value_object.0);
@@ -402,6 +409,7 @@ fn read_units<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<
         let read = unit.and_then(|code| u32::try_from(code).ok()).map(Unit);
         signal.unit = read.or(signal.unit).or(fixed);
         signal.digits = digits.and_then(|digits| u8::try_from(digits).ok());
+        signal.lacks_scale = lacks_scale;
         if let Some((step, number)) = step {
             signals::set_step(signal, step, number);
         }

@@ -17,6 +17,10 @@ pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
         Doubt::UnknownDigits => {
             format!("node {node}: {signal}: the decimal digits (6132h) are unknown: the value is the unscaled integer")
         }
+        Doubt::UnreadScale => format!(
+            "node {node}: {signal}: no value: its decimal digits (6132h) are unknown, because the device gave no valid \
+             answer; try again, or with more --retries"
+        ),
         Doubt::LooksLikeInteger => format!(
             "node {node}: {signal}: no value: the REAL32 is almost 0, so the object is probably an integer; name the \
              device: --device dps (or --eds FILE)"

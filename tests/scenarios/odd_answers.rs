@@ -321,9 +321,18 @@ fn silent_status_object_is_an_unknown_status() {
         assert_eq!(sample.doubt, Some(Doubt::UnknownStatus), "{kind}");
         assert_eq!(readings_of(kind, &[])[0].1.doubt, None, "{kind}");
     }
-    let (_, sample) = &readings_of("dps", &[0x6132])[0];
-    assert_eq!((sample.value.is_some(), sample.doubt), (true, Some(Doubt::UnknownDigits)));
     assert_eq!(readings("mh4", &[0x6130]).expect_err("the value does not answer").kind(), Kind::NoAnswer);
+}
+
+#[test]
+fn integer_without_an_answer_for_its_digits_has_no_value() {
+    for kind in ["mc1609", "dps"] {
+        let found = readings(kind, &[0x6132]).expect("values");
+        assert!(!found.is_empty());
+        for (_, sample) in &found {
+            assert_eq!((sample.value, sample.doubt), (None, Some(Doubt::UnreadScale)), "{kind}");
+        }
+    }
 }
 
 #[test]

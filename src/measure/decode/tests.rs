@@ -38,6 +38,7 @@ fn node((object, data_type): (ObjectId, DataType), words: &[u32], signal: impl F
         has_marker: false,
         unit: Some(Unit(0x004e_0000)),
         digits: Some(3),
+        lacks_scale: false,
         rules: crate::measure::layout::Rules::default(),
         range: MeasuringRange::Unknown,
     };

@@ -60,8 +60,7 @@ fn read_family<A: Ask>(
     let values = reader.values(&items)?;
     for (&(at, number, _), ends) in wanted.iter().zip(values.chunks(2)) {
         let signal = &mut nodes[at].signals[number];
-        let digits = signal.digits.unwrap_or(0);
-        let number = |value: &Option<Value>| Number::from_value(value.as_ref()?, digits).map(Number::as_f64);
+        let number = |value: &Option<Value>| signal.number(value.as_ref()?).map(Number::as_f64);
         if let [start, end] = ends
             && let Some((start, end)) = number(start).zip(number(end))
             && start.is_finite()

@@ -194,7 +194,7 @@ fn number(
     let data_type = data_type(device, object, of_family(object));
     match master.read(device.id, object, data_type)? {
         Ok(value) => {
-            let number = Number::from_value(&value, signal.digits.unwrap_or(0)).filter(|number| number.is_finite());
+            let number = signal.number(&value).filter(|number| number.is_finite());
             Ok(number.map(|number| Offset { object, data_type, value, number }))
         }
         Err(SdoError { failure: SdoFailure::Refused(_) | SdoFailure::Fit(_), .. }) => Ok(None),

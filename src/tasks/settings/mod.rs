@@ -117,7 +117,7 @@ fn set_object(master: &mut Master<'_>, node: &Node, object: ObjectId, data: &[u8
 
 /// A value of an object in the unit of its signal; `None` if it is not a finite number.
 fn quantity(signal: &Signal, value: &Value) -> Option<ValueWithUnit> {
-    let number = Number::from_value(value, signal.digits.unwrap_or(0)).filter(|number| number.as_f64().is_finite())?;
+    let number = signal.number(value).filter(|number| number.as_f64().is_finite())?;
     Some(ValueWithUnit { number, unit: signal.unit })
 }
 

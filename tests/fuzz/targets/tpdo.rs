@@ -30,6 +30,7 @@ fuzz_target!(|data: &[u8]| {
         has_marker: head & 2 != 0,
         unit: Some(Unit(bytes.long())),
         digits: Some(bytes.byte()),
+        lacks_scale: bytes.byte() == 0,
         rules: cangauge::measure::layout::Rules::default(),
         range: cangauge::measure::layout::MeasuringRange::Unknown,
     });
