@@ -6,6 +6,7 @@
 //! - [`wait`]: receives frames until a deadline, with one policy for Ctrl-C, link down and the end of a recording;
 //! - [`state`]: NMT states, commands, reset and the restart;
 //! - [`scan`] and [`targets`]: the nodes on the bus, and the nodes that `all` selects;
+//! - [`transfers`]: the SDO transfers of other masters, assembled from their frames;
 //! - [`overheard`]: the objects that other masters read and write;
 //! - [`mod@offline`]: a node from its description, without a bus;
 //! - [`names`]: the objects, types and signals behind names.
@@ -23,6 +24,7 @@ pub(crate) mod signals;
 pub mod state;
 pub mod survey;
 pub mod targets;
+pub mod transfers;
 pub mod wait;
 pub mod write;
 

@@ -1,12 +1,13 @@
 //! The objects of nodes that other masters read and write, from their SDO traffic. Nothing is sent.
 
 use super::Identity;
-use crate::canopen::frame::Frame;
+use super::transfers::{Outcome, Transfer, Transfers};
+use crate::bus::Received;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{Progress, Upload};
 use crate::canopen::value::DataType;
 use crate::device::catalog::{Model, recognise};
+use crate::master::Operation;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -16,19 +17,18 @@ pub struct Overheard {
     known: BTreeMap<(NodeId, ObjectId), Vec<u8>>,
     /// Objects whose read was rejected by the node.
     refused: BTreeSet<(NodeId, ObjectId)>,
-    uploads: BTreeMap<NodeId, (ObjectId, Upload)>,
-    downloads: BTreeMap<NodeId, (ObjectId, Vec<u8>)>,
+    transfers: Transfers,
 }
 
 impl Overheard {
     /// Handles a frame. Returns the node and the object after a new value, or after the first rejected read.
-    pub fn take(&mut self, frame: &Frame) -> Option<(NodeId, ObjectId)> {
-        if let Some(node) = frame.id().sdo_request_node() {
-            self.request(node, frame);
-            return None;
+    pub fn take(&mut self, received: &Received) -> Option<(NodeId, ObjectId)> {
+        self.transfers.take(received);
+        let mut learned = None;
+        while let Some(transfer) = self.transfers.next_finished() {
+            learned = self.learn(transfer).or(learned);
         }
-        let node = frame.id().sdo_response_node()?;
-        self.response(node, frame).map(|object| (node, object))
+        learned
     }
 
     /// Forgets the objects of a node for which `is_forgotten` is true.
@@ -36,10 +36,7 @@ impl Overheard {
         let stays = |(of, object): &(NodeId, ObjectId)| *of != node || !is_forgotten(*object);
         self.known.retain(|key, _| stays(key));
         self.refused.retain(stays);
-        if self.uploads.get(&node).is_some_and(|(object, _)| is_forgotten(*object)) {
-            self.uploads.remove(&node);
-        }
-        self.downloads.remove(&node);
+        self.transfers.forget(node, is_forgotten);
     }
 
     /// The bytes of an object.
@@ -79,51 +76,16 @@ impl Overheard {
         recognise(&traits)
     }
 
-    fn request(&mut self, node: NodeId, frame: &Frame) {
-        let [command, a, b, c, data @ ..] = frame.data() else { return };
-        let object = ObjectId::from_multiplexer([*a, *b, *c]);
-        match command {
-            0x40 => {
-                self.uploads.insert(node, (object, Upload::new(node, object, false)));
+    fn learn(&mut self, transfer: Transfer) -> Option<(NodeId, ObjectId)> {
+        let key = (transfer.node, transfer.object);
+        let is_new = match (transfer.outcome, transfer.operation) {
+            (Outcome::Done(uploaded), _) => self.known.insert(key, uploaded.bytes.clone()) != Some(uploaded.bytes),
+            (Outcome::Aborted { by_master: false, .. } | Outcome::Violation(..), Operation::Read) => {
+                self.refused.insert(key)
             }
-            0x22 | 0x23 | 0x27 | 0x2b | 0x2f => {
-                let unused = if command & 1 == 0 { 0 } else { usize::from(command >> 2 & 3) };
-                let end = data.len().min(4 - unused);
-                self.downloads.insert(node, (object, data[..end].to_vec()));
-            }
-            0x80 => {
-                self.uploads.remove(&node);
-                self.downloads.remove(&node);
-            }
-            _ => {}
-        }
-    }
-
-    fn response(&mut self, node: NodeId, frame: &Frame) -> Option<ObjectId> {
-        if let (Some((object, _)), [0x60, a, b, c, ..]) = (self.downloads.get(&node), frame.data())
-            && *object == ObjectId::from_multiplexer([*a, *b, *c])
-            && let Some((object, bytes)) = self.downloads.remove(&node)
-        {
-            return self.learn(node, object, bytes);
-        }
-        // The other master requests the segments, so the requests of our state machine are not sent.
-        let (object, upload) = self.uploads.get_mut(&node)?;
-        let object = *object;
-        match upload.on_frame(frame, &mut Vec::new()) {
-            Progress::Done(uploaded) => {
-                self.uploads.remove(&node);
-                self.learn(node, object, uploaded.bytes)
-            }
-            Progress::Failed(_) => {
-                self.uploads.remove(&node);
-                self.refused.insert((node, object)).then_some(object)
-            }
-            Progress::NotOurs | Progress::Continue => None,
-        }
-    }
-
-    fn learn(&mut self, node: NodeId, object: ObjectId, bytes: Vec<u8>) -> Option<ObjectId> {
-        (self.known.insert((node, object), bytes.clone()) != Some(bytes)).then_some(object)
+            _ => false,
+        };
+        is_new.then_some(key)
     }
 }
 
@@ -138,12 +100,14 @@ pub fn first_four(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bus::Stamp;
 
     fn heard(frames: &[&str]) -> (Overheard, Vec<ObjectId>) {
         let mut heard = Overheard::default();
         let mut learned = Vec::new();
         for frame in frames {
-            learned.extend(heard.take(&frame.parse().expect("a frame")).map(|(_, object)| object));
+            let received = Received { frame: frame.parse().expect("a frame"), at: Stamp::default() };
+            learned.extend(heard.take(&received).map(|(_, object)| object));
         }
         (heard, learned)
     }

@@ -74,7 +74,7 @@ impl Presence {
     fn on_any_frame(&mut self, received: &Received) {
         self.on_frame(received);
         let frame = &received.frame;
-        self.overheard.take(frame);
+        self.overheard.take(received);
         let emergency = frame.id().emergency_node().filter(|_| Emergency::parse(frame).is_some());
         if let (Some(node), false) = (emergency.or(tpdo_node(frame.id())), frame.is_remote()) {
             self.states.entry(node).or_insert(None);

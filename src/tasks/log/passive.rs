@@ -24,6 +24,8 @@ pub(in crate::tasks) struct SetupListener {
     overrides: Overrides,
     wanted: Vec<Wanted>,
     overheard: Overheard,
+    /// Descriptions of devices whose identity is known from elsewhere.
+    pub(in crate::tasks) recognised: Overrides,
     /// COB-IDs of the TPDOs that are decoded.
     decoded: BTreeSet<CanId>,
     /// COB-IDs of TPDOs whose mapping is unknown, and the nodes that sent them.
@@ -37,6 +39,7 @@ impl SetupListener {
             overrides: overrides.clone(),
             wanted: wanted.to_vec(),
             overheard: Overheard::default(),
+            recognised: Overrides::new(),
             decoded: BTreeSet::new(),
             not_understood: BTreeMap::new(),
         }
@@ -52,7 +55,7 @@ impl SetupListener {
     /// the recorded node if the frame contained information about the node.
     pub(in crate::tasks) fn take(&mut self, received: &Received, decoder: &mut Decoder) -> Option<NodeId> {
         let frame = &received.frame;
-        if let Some((node, _)) = self.overheard.take(frame).filter(|(node, _)| self.nodes.contains(node)) {
+        if let Some((node, _)) = self.overheard.take(received).filter(|(node, _)| self.nodes.contains(node)) {
             self.update(node, decoder);
             return Some(node);
         }
@@ -127,9 +130,13 @@ impl SetupListener {
     pub(in crate::tasks) fn known_node(&self, id: NodeId) -> Node {
         let mut node = Node::new(id);
         node.identity = self.overheard.identity(id);
-        node.model = self.named(id).cloned().or_else(|| self.overheard.recognise(id));
+        let recognised = || self.overheard.recognise(id).or_else(|| self.recognised.get(&id).cloned());
+        node.model = self.named(id).cloned().or_else(recognised);
         if let Some(word) = self.number(id, ObjectId::new(0x1014, 0)).map(CobId).filter(|word| word.is_valid()) {
             node.emergency = word.can_id();
+        }
+        if let Some(word) = self.number(id, ObjectId::new(0x1005, 0)).map(CobId) {
+            node.sync = word.can_id();
         }
         node.tpdos = (1..=512).filter_map(TpdoNumber::new).filter_map(|number| self.tpdo(id, number)).collect();
         node.signals = self.signals(&node);
