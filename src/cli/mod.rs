@@ -20,6 +20,7 @@ mod limits;
 mod log;
 mod lss;
 mod minmax;
+mod monitor;
 mod nmt;
 mod nodes;
 mod objects;
@@ -256,6 +257,7 @@ commands! {
     Restore(store::Restore): "restore";
     Sim(sim::Sim): "sim";
     Doctor(doctor::Doctor): "doctor";
+    Monitor(monitor::Monitor): "monitor";
     Objects(objects::Objects): "objects";
     Export(export::Export): "export";
     Plot(plot::Plot): "plot";
@@ -281,6 +283,7 @@ impl Command {
             Command::Info(info) => info.passive,
             Command::Log(log) => log.passive,
             Command::Doctor(doctor) => doctor.passive,
+            Command::Monitor(_) => true,
             _ => false,
         }
     }

@@ -121,6 +121,16 @@ pub fn entry(object: ObjectId) -> Option<Entry> {
     rows.iter().find_map(|row| row.entry(object, &prefix))
 }
 
+/// The fixed unit of the number in an object of CiA 301, in the form of descriptions: `ms`, `100us`.
+pub fn unit(object: ObjectId) -> Option<&'static str> {
+    match (object.index, object.sub) {
+        (0x1006 | 0x1007, 0) => Some("us"),
+        (0x100c | 0x1017, 0) | (0x1800..=0x19ff, 5) => Some("ms"),
+        (0x1015, 0) | (0x1800..=0x19ff, 3) => Some("100us"),
+        _ => None,
+    }
+}
+
 /// The entry with a name: `vendor-id`, `error-history:1`, `tpdo1-mapping:2`. Letter case is ignored.
 pub fn find(name: &str) -> Option<Entry> {
     let name = name.to_ascii_lowercase();

@@ -23,6 +23,7 @@ pub mod interfaces;
 pub mod json;
 pub mod junit;
 pub mod lss;
+pub mod monitor;
 pub mod nmt;
 pub mod notes;
 pub mod objects;

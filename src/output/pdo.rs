@@ -145,13 +145,18 @@ impl Report for ReceivedTpdo {
 
     /// All values of a TPDO on one line.
     fn line(&self, out: &mut dyn Write) -> io::Result<()> {
-        let value = |(source, sample): &(Source, Sample)| {
-            let value = sample.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
-            let status = sample.status.map_or("", Status::as_str);
-            let words = [&*source.signal, &value, &*source.unit, status];
-            words.iter().filter(|word| !word.is_empty()).copied().collect::<Vec<_>>().join(" ")
-        };
-        let values: Vec<String> = self.values.iter().map(value).collect();
-        writeln!(out, "{}  {:>3}  {}  {}", text::utc(self.at), self.node, self.number, values.join("  "))
+        let values = values_text(&self.values);
+        writeln!(out, "{}  {:>3}  {}  {values}", text::utc(self.at), self.node, self.number)
     }
+}
+
+/// `pressure 1.234 bar ok  temperature 25.0 degC ok`.
+pub(super) fn values_text(values: &[(Source, Sample)]) -> String {
+    let value = |(source, sample): &(Source, Sample)| {
+        let value = sample.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
+        let status = sample.status.map_or("", Status::as_str);
+        let words = [&*source.signal, &value, &*source.unit, status];
+        words.iter().filter(|word| !word.is_empty()).copied().collect::<Vec<_>>().join(" ")
+    };
+    values.iter().map(value).collect::<Vec<_>>().join("  ")
 }

@@ -63,13 +63,18 @@ impl ObjectValue {
             _ if self.form == ValueForm::Hexadecimal => {
                 hexadecimal(&self.read.raw).unwrap_or_else(|| text::spaced_bytes(&self.read.raw))
             }
-            Value::Text(text) => text::safe(text),
-            Value::Bytes(bytes) => text::spaced_bytes(bytes),
-            Value::Unsigned(_) if is_usually_hexadecimal(self.read.object) => {
-                hexadecimal(&self.read.raw).unwrap_or_default()
-            }
-            value => value.to_string(),
+            value => usual(self.read.object, value, &self.read.raw),
         }
+    }
+}
+
+/// The usual text of a value. `raw` has its bytes.
+pub(super) fn usual(object: ObjectId, value: &Value, raw: &[u8]) -> String {
+    match value {
+        Value::Text(text) => text::safe(text),
+        Value::Bytes(bytes) => text::spaced_bytes(bytes),
+        Value::Unsigned(_) if is_usually_hexadecimal(object) => hexadecimal(raw).unwrap_or_default(),
+        value => value.to_string(),
     }
 }
 

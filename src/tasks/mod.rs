@@ -13,6 +13,7 @@ pub mod host;
 pub mod journal;
 pub mod log;
 pub mod lss;
+pub mod monitor;
 pub mod nmt;
 pub mod note;
 pub mod pdo;

@@ -24,6 +24,7 @@ mod log_layout;
 mod log_rotate;
 mod log_stall;
 mod lss;
+mod monitor;
 mod nmt;
 mod output;
 mod pdo;

@@ -19,7 +19,7 @@ use super::quirk::Quirk;
 use super::scalar::Scalar;
 use super::scale::{Markers, Scale, StatusBits};
 use super::unit::Unit;
-use crate::canopen::emcy::ErrorRegister;
+use crate::canopen::emcy::{Emergency, ErrorRegister};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
@@ -369,4 +369,18 @@ impl Description {
         }
         texts.join(", ")
     }
+}
+
+/// The meaning of an emergency on a device with this description: the text for its code, and the set bits of its error
+/// register, unless the device always sends the same register with this code.
+pub fn emergency_text(description: Option<&Description>, emergency: Emergency) -> String {
+    let described = description.and_then(|description| description.emergency(emergency.code));
+    let text = described.map_or_else(|| Emergency::class(emergency.code), |entry| &entry.text).to_owned();
+    if described.is_some_and(|entry| entry.register.is_some()) {
+        return text;
+    }
+    let words = |register: ErrorRegister| {
+        description.map_or_else(|| register.to_string(), |description| description.register_text(register.0))
+    };
+    emergency.register.map(words).map_or(text.clone(), |words| format!("{text}, {words}"))
 }

@@ -1,10 +1,11 @@
 //! The emergency messages of the recorded nodes.
 
 use crate::bus::Mono;
-use crate::canopen::emcy::{Emergency, ErrorRegister};
+use crate::canopen::emcy::Emergency;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::device::catalog::Model;
+use crate::device::description::emergency_text;
 use crate::device::quirk::Quirk;
 use crate::node::Node;
 use std::collections::BTreeMap;
@@ -105,16 +106,7 @@ impl Emergencies {
     /// The meaning of an emergency code on this node. Also the set bits of its error register, unless the device always
     /// sends the same register with this code.
     pub(super) fn meaning(&self, node: NodeId, emergency: Emergency) -> String {
-        let description = self.models.get(&node).map(|model| &model.description);
-        let described = description.and_then(|description| description.emergency(emergency.code));
-        let text = described.map_or_else(|| Emergency::class(emergency.code), |entry| &entry.text).to_owned();
-        if described.is_some_and(|entry| entry.register.is_some()) {
-            return text;
-        }
-        let words = |register: ErrorRegister| {
-            description.map_or_else(|| register.to_string(), |description| description.register_text(register.0))
-        };
-        emergency.register.map(words).map_or(text.clone(), |words| format!("{text}, {words}"))
+        emergency_text(self.models.get(&node).map(|model| &model.description), emergency)
     }
 
     /// The change of an overload that an emergency reports.
