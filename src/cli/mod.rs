@@ -9,6 +9,7 @@ mod config;
 mod descriptions;
 mod devices;
 mod doctor;
+mod effects;
 mod errors;
 pub mod exit;
 mod export;
@@ -263,59 +264,6 @@ commands! {
     Plot(plot::Plot): "plot";
     Devices(devices::Devices): "devices";
     Completions(completions::Completions): "completions";
-}
-
-impl Command {
-    /// Whether the command only reads objects.
-    fn only_reads(&self) -> bool {
-        match self {
-            Command::Scan(_) | Command::Read(_) | Command::Info(_) | Command::Doctor(_) => true,
-            Command::Objects(_) | Command::Devices(_) | Command::Export(_) => true,
-            Command::Sdo(sdo) => sdo.only_reads(),
-            _ => false,
-        }
-    }
-
-    /// Whether the command only listens. An adapter then sends no acknowledgement.
-    fn listens_only(&self) -> bool {
-        match self {
-            Command::Scan(scan) => scan.passive,
-            Command::Info(info) => info.passive,
-            Command::Log(log) => log.passive,
-            Command::Doctor(doctor) => doctor.passive,
-            Command::Monitor(_) => true,
-            _ => false,
-        }
-    }
-
-    /// The reaction if two devices have one node-ID.
-    fn on_two_devices(&self) -> OnTwoDevices {
-        let writes = match self {
-            Command::Scan(_) => return OnTwoDevices::Report,
-            Command::Sdo(sdo) => !sdo.only_reads(),
-            Command::Unit(unit) => unit.writes(),
-            Command::Filter(filter) => filter.writes(),
-            Command::Limits(limits) => limits.writes(),
-            Command::Minmax(minmax) => minmax.reset,
-            Command::Errors(errors) => errors.clear,
-            Command::Pdo(pdo) => pdo.writes(),
-            Command::Nmt(nmt) => nmt.writes(),
-            Command::Config(config) => !config.only_reads(),
-            Command::Lss(_) | Command::Autozero(_) | Command::Tare(_) | Command::Store(_) | Command::Restore(_) => true,
-            _ => false,
-        };
-        if writes { OnTwoDevices::RefuseWrites } else { OnTwoDevices::Fail }
-    }
-
-    /// Whether the command changes devices in a way that affects later commands.
-    fn changes_devices(&self) -> bool {
-        match self {
-            Command::Lss(lss) => lss.changes_devices(),
-            Command::Nmt(nmt) => nmt.changes_devices(),
-            Command::Autozero(autozero) => !autozero.dry_run,
-            _ => self.on_two_devices() == OnTwoDevices::RefuseWrites,
-        }
-    }
 }
 
 /// Whether a simulated bus is given by a file, not by a list of devices.
