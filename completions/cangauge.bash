@@ -3531,7 +3531,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__log)
-            opts="-d -n -o -b -t -f -q -v -h -V --duration --count --sync --poll --request --passive --start --no-nmt --max-gap --expect --output --force --append --layout --rotate --events --summary --delimiter --decimal --bom --time --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-d -n -o -b -t -f -q -v -h -V --duration --count --sync --poll --request --passive --start --no-nmt --max-gap --expect --plot --output --force --append --layout --rotate --events --summary --delimiter --decimal --bom --time --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0

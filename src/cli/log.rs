@@ -8,12 +8,15 @@ use super::args::{Duration, Nodes, SignalArg};
 use super::recording::{poll_interval, print_verdicts, refuse_to_send, request_interval, sync_interval};
 use super::{Global, When, descriptions, open};
 use crate::bus::claim::Claim;
+use crate::bus::time::ahead_of_utc;
 use crate::canopen::id::NodeId;
 use crate::master::Master;
 use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
 use crate::output::console::Console;
+use crate::output::plot::{Plot, TimeAxis};
 use crate::output::progress::Progress;
+use crate::output::recording::{Recording, TimeBase};
 use crate::output::rows::FileFormat;
 use crate::tasks::check::Checker;
 use crate::tasks::log::{LogOptions, Mode, log};
@@ -84,6 +87,9 @@ pub(crate) struct Log {
     /// Exit with 1 at the end if this expression failed: 'pressure in 9..11 bar' (see cangauge check --help)
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     expect: Vec<Expression>,
+    /// Plot the values at the end, on stderr (see cangauge plot)
+    #[arg(long)]
+    plot: bool,
     #[command(flatten)]
     files: Files,
 }
@@ -133,7 +139,7 @@ impl Log {
         let is_shared = global.progress == When::Auto && files.rows.is_none() && io::stdout().is_terminal();
         let progress = Progress::new(global.shows_progress() && !is_shared, self.duration.map(|d| d.0), self.count);
         let console = Console { progress: Some(progress.multi()), ..global.console() };
-        let (report, verdicts, recorder) = global.with_claims(|master, claims| {
+        let (report, verdicts, mut recorder) = global.with_claims(|master, claims| {
             let is_live = master.bus().is_live();
             let nodes = match (&self.nodes, self.passive || !is_live) {
                 (Nodes::All, true) => NodeId::all().collect(),
@@ -145,6 +151,7 @@ impl Log {
             let mut recorder =
                 Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
             // Without --poll, the nodes are free for other processes as soon as the recording runs.
+            recorder.plot = self.plot.then(|| Recording::new(TimeBase::Clock));
             recorder.claims = self.poll.is_none().then(|| std::mem::take(claims));
             let mut checker = Checker::new(&self.expect, &options.nodes, true, &mut recorder);
             let report = log(master, &options, &mut checker);
@@ -161,6 +168,7 @@ impl Log {
         })?;
         let interrupted = report.as_ref().is_ok_and(|report| report.interrupted);
         let is_limited = self.count.is_some() || self.duration.is_some();
+        let plot = recorder.plot.take();
         let Ended { written, unwritten, deleted } = wait_for_writers(recorder, interrupted);
         let is_closed = match unwritten {
             Some(unwritten) if is_limited && unwritten.is_closed_output() => true,
@@ -174,6 +182,10 @@ impl Log {
         let mut finished = Finished { report, verdicts: Vec::new(), written, deleted, is_limited, is_closed };
         let console = global.console();
         finished.summary().lines().iter().for_each(|line| console.note(line));
+        let title = self.files.output.as_ref().map(|file| file.display().to_string()).unwrap_or_default();
+        let axis = TimeAxis::Clock(ahead_of_utc);
+        let plot = plot.and_then(|recording| Plot::new(recording, title, axis, [None; 2]));
+        plot.iter().for_each(|plot| console.plot(plot));
         finished.verdicts = verdicts?;
         Ok(finished)
     }

@@ -11,7 +11,7 @@ use crate::device::nearest::distance;
 use crate::output::plot::{self, TimeAxis};
 use crate::output::recording::{Recording, RecordingError, TimeBase};
 use crate::output::rows::Series;
-use crate::output::terminal_width;
+use crate::output::stdout_width;
 use crate::tasks::Kind;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -139,7 +139,7 @@ impl Plot {
                 read(&path, &mut recording, global)?;
             }
         }
-        recording.sort();
+        recording.finish();
         let names: Vec<String> = self.files.iter().map(|file| file.display().to_string()).collect();
         let title = names.join(", ");
         if recording.curves.is_empty() {
@@ -152,7 +152,7 @@ impl Plot {
         let plot = plot.ok_or_else(|| ErrorMessage::usage("no values between --from and --to"))?;
         let Some(path) = &self.output else {
             let mut out = anstream::AutoStream::new(open_stdout()?, global.console().color).lock();
-            return plot::terminal(&plot, terminal_width(), &mut out).map_err(stdout);
+            return plot::terminal(&plot, stdout_width().unwrap_or(80), &mut out).map_err(stdout);
         };
         let picture = match extension(path).as_deref() {
             Some("png") => plot::png(&plot)?,

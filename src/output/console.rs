@@ -1,7 +1,8 @@
 //! stderr: errors, hints, warnings and notes.
 
 use super::failure::ErrorMessage;
-use super::text;
+use super::plot::{Plot, terminal};
+use super::{stderr_size, text};
 use anstream::ColorChoice;
 use anstyle::{AnsiColor, Style};
 use indicatif::MultiProgress;
@@ -40,6 +41,13 @@ impl Console {
         if !self.quiet {
             self.line(Style::new(), "", message);
         }
+    }
+
+    /// Draws a plot.
+    pub fn plot(&self, plot: &Plot) {
+        let mut err = anstream::AutoStream::new(io::stderr(), self.color);
+        // If stderr is closed, the error cannot be reported anywhere.
+        let _ = terminal(plot, stderr_size().map_or(80, |(width, _)| width), &mut err);
     }
 
     /// Prints a detail, only with `-v`.

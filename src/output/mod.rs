@@ -44,7 +44,13 @@ pub mod table;
 pub mod text;
 pub mod verdict;
 
-/// The width of the terminal on stdout in characters; 80 without a terminal.
-pub fn terminal_width() -> usize {
-    terminal_size::terminal_size_of(std::io::stdout()).map_or(80, |(width, _)| usize::from(width.0))
+/// The width of the terminal on stdout in characters.
+pub fn stdout_width() -> Option<usize> {
+    terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| usize::from(width.0))
+}
+
+/// The width and height of the terminal on stderr in characters.
+pub fn stderr_size() -> Option<(usize, usize)> {
+    let size = terminal_size::terminal_size_of(std::io::stderr());
+    size.map(|(width, height)| (usize::from(width.0), usize::from(height.0)))
 }

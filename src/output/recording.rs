@@ -4,10 +4,13 @@ mod cells;
 
 use super::events;
 use super::rows::LONG_COLUMNS;
-use crate::measure::sample::Status;
+use crate::bus::{Mono, Stamp};
+use crate::measure::interval::IntervalTracker;
+use crate::measure::sample::{Sample, Source, Status};
 use cells::{Cells, Clock, LongRow, WideRow, decimal, micros, text};
 use std::borrow::Cow;
 use std::io::{self, BufRead};
+use std::time::Duration;
 
 /// The byte order mark at the start of a file.
 const BOM: &[u8] = b"\xef\xbb\xbf";
@@ -32,7 +35,7 @@ pub struct Curve {
 pub struct Point {
     /// The time in microseconds.
     pub at: i64,
-    /// The number; not a number if there is none.
+    /// The number; not a number if there is none. Without a status, this is a gap.
     pub value: f64,
     /// The status, unless it is `ok`.
     pub status: Option<Status>,
@@ -102,12 +105,52 @@ pub struct Recording {
     clock: Clock,
     /// The curve of the last value: rows repeat the signals in the same order.
     last: usize,
+    /// The usual interval of each curve of a running recording.
+    intervals: Vec<IntervalTracker>,
 }
+
+/// A running recording keeps at most this many values of each signal.
+const MOST_POINTS: usize = 1 << 15;
+
+/// The columns of time in which a running recording keeps the first, the lowest, the highest and the last value.
+const COLUMNS: i64 = 1 << 11;
 
 impl Recording {
     /// An empty recording.
     pub fn new(base: TimeBase) -> Recording {
-        Recording { base, curves: Vec::new(), events: Vec::new(), run: 1, elapsed: 0, clock: Clock::default(), last: 0 }
+        Recording {
+            base,
+            curves: Vec::new(),
+            events: Vec::new(),
+            run: 1,
+            elapsed: 0,
+            clock: Clock::default(),
+            last: 0,
+            intervals: Vec::new(),
+        }
+    }
+
+    /// Adds a value of a running recording. Its memory stays limited.
+    pub fn push(&mut self, sample: &Sample, source: &Source) {
+        let at = microseconds(sample.at);
+        let value = sample.value.map_or(f64::NAN, |value| value.as_f64());
+        let status = sample.status.filter(|status| *status != Status::Ok);
+        self.add(source.node.get(), &source.signal, &source.unit, Point { at, value, status });
+        self.intervals.resize(self.curves.len(), IntervalTracker::default());
+        let points = &mut self.curves[self.last].points;
+        if self.intervals[self.last].add(sample.at.mono, None).is_some() {
+            points.insert(points.len() - 1, gap(at));
+        }
+        if points.len() >= MOST_POINTS {
+            thin_out(points);
+        }
+    }
+
+    /// Adds an event of a running recording.
+    pub fn push_event(&mut self, at: Stamp, node: Option<u8>, event: &str) {
+        if self.events.len() < MOST_POINTS {
+            self.events.push(EventMark { at: microseconds(at), node, event: event.to_owned() });
+        }
     }
 
     /// Adds the contents of a file.
@@ -157,12 +200,13 @@ impl Recording {
         }
     }
 
-    /// Puts the values and events in the order of their times, as files can be given in any order.
-    pub fn sort(&mut self) {
+    /// Puts the values and events in the order of their times, as files can be given in any order, and finds the gaps.
+    pub fn finish(&mut self) {
         for curve in &mut self.curves {
             if !curve.points.is_sorted_by_key(|point| point.at) {
                 curve.points.sort_by_key(|point| point.at);
             }
+            mark_gaps(&mut curve.points);
         }
         self.events.sort_by_key(|event| event.at);
     }
@@ -265,6 +309,53 @@ impl Recording {
     }
 }
 
+fn microseconds(at: Stamp) -> i64 {
+    i64::try_from(at.wall.since_epoch().as_micros()).unwrap_or(i64::MAX)
+}
+
+/// A gap before the value at this time.
+fn gap(at: i64) -> Point {
+    Point { at, value: f64::NAN, status: None }
+}
+
+/// Adds the gaps: intervals longer than three usual ones.
+fn mark_gaps(points: &mut Vec<Point>) {
+    let Some(start) = points.first().map(|point| point.at) else { return };
+    let mut intervals = IntervalTracker::default();
+    let mut is_gap = |point: &Point| {
+        let since_start = Duration::from_micros(u64::try_from(point.at - start).unwrap_or(0));
+        intervals.add(Mono::at(since_start), None).is_some()
+    };
+    let gaps: Vec<usize> = (0..points.len()).filter(|&at| is_gap(&points[at])).collect();
+    if gaps.is_empty() {
+        return;
+    }
+    let mut gaps = gaps.into_iter().peekable();
+    let with_gap = |(at, point): (usize, Point)| [gaps.next_if_eq(&at).map(|_| gap(point.at)), Some(point)];
+    *points = std::mem::take(points).into_iter().enumerate().flat_map(with_gap).flatten().collect();
+}
+
+/// Keeps of each column of time the first, the lowest, the highest and the last value, a gap, and each status once.
+fn thin_out(points: &mut Vec<Point>) {
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return };
+    let (first, width) = (first.at, (last.at - first.at) / COLUMNS + 1);
+    let mut kept = Vec::new();
+    for column in points.chunk_by(|a, b| (a.at - first) / width == (b.at - first) / width) {
+        let of = |at: usize| column[at].value;
+        let numbers = || (0..column.len()).filter(|&at| of(at).is_finite());
+        let lowest = numbers().min_by(|&a, &b| of(a).total_cmp(&of(b)));
+        let highest = numbers().max_by(|&a, &b| of(a).total_cmp(&of(b)));
+        let gap = column.iter().position(|point| point.value.is_nan() && point.status.is_none());
+        let marks = MARKED.map(|status| column.iter().position(|point| point.status == Some(status)));
+        let ends = [numbers().next(), lowest, highest, numbers().next_back(), gap];
+        let mut places: Vec<usize> = ends.into_iter().chain(marks).flatten().collect();
+        places.sort_unstable();
+        places.dedup();
+        kept.extend(places.into_iter().map(|at| column[at]));
+    }
+    *points = kept;
+}
+
 /// The table that a header starts. `None` if the line is not a header.
 fn header(line: &[u8]) -> Option<Table> {
     let delimiter = *line.strip_prefix(LONG_COLUMNS[0].as_bytes())?.first()?;
@@ -301,9 +392,11 @@ fn point(at: i64, value: &[u8], word: &[u8]) -> Option<Point> {
     Some(Point { at, value, status: status(word)? })
 }
 
+/// The statuses that a plot marks.
+pub(super) const MARKED: [Status; 4] = [Status::OverloadHigh, Status::OverloadLow, Status::Clipped, Status::Invalid];
+
 /// The status of a word; `Some(None)` for `ok` and for no status. `None` if it is no status.
 fn status(word: &[u8]) -> Option<Option<Status>> {
-    const MARKED: [Status; 4] = [Status::Invalid, Status::OverloadHigh, Status::OverloadLow, Status::Clipped];
     if word.is_empty() || word == Status::Ok.as_str().as_bytes() {
         return Some(None);
     }

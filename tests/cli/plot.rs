@@ -86,3 +86,14 @@ fn cut_off_line_is_a_warning() {
     let done = bench.run("plot mixed.csv -o mixed.svg").exit(0);
     assert_eq!(done.stderr, "warning: mixed.csv: 3 lines are not rows, and were skipped (first: 2)\n");
 }
+
+#[test]
+fn log_plots_at_the_end() {
+    let bench = Bench::of(ALL);
+    let done = bench.run("log 1,127 --sync 50ms --count 100 -o run.csv --plot").exit(0);
+    assert!(done.stderr.contains("\nrun.csv\nnode 1 pressure [bar]\n"), "{}", done.stderr);
+    assert!(done.stderr.contains("node 127 pressure [psi]\n") && done.stderr.contains(" ┤"), "{}", done.stderr);
+    let done = bench.run("log 1 pressure --sync 50ms --count 10 --plot").exit(0);
+    assert!(done.stdout.starts_with("time,") && !done.stdout.contains('┤'), "{}", done.stdout);
+    assert!(done.stderr.contains("\nnode 1 pressure [bar]\n"), "{}", done.stderr);
+}

@@ -3,11 +3,13 @@
 use super::super::recording::print_event;
 use crate::bus::claim::Claims;
 use crate::bus::{Mono, Stamp};
+use crate::canopen::id::NodeId;
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
 use crate::output::events::{EventText, Events, Weight, event_text, file_change_text};
 use crate::output::failure::ErrorMessage;
 use crate::output::progress::Progress;
+use crate::output::recording::Recording;
 use crate::output::rows::{FileChange, Rows};
 use crate::tasks::Failure;
 use crate::tasks::log::{Change, LogEvent, LogFailure, Observer};
@@ -32,6 +34,8 @@ pub(super) struct Recorder {
     pub(super) progress: Progress,
     pub(super) console: Console,
     pub(super) error: Option<Unwritten>,
+    /// The values and events for `--plot`.
+    pub(super) plot: Option<Recording>,
     /// The name of the file of the rows.
     file: String,
     /// The nodes that no other cangauge may use until the recording runs.
@@ -59,6 +63,7 @@ impl Recorder {
             progress,
             console,
             error: None,
+            plot: None,
             claims: None,
             file,
             start: None,
@@ -80,6 +85,9 @@ impl Recorder {
 
     fn put_event(&mut self, text: &EventText, at: Stamp) {
         print_event(&self.console, text);
+        if let (Some(plot), Some(event)) = (&mut self.plot, text.event) {
+            plot.push_event(at, text.node.map(NodeId::get), event);
+        }
         let elapsed = self.rows.elapsed(at);
         if let Some(Err(error)) = self.events.as_mut().map(|events| events.add(at, elapsed, text)) {
             self.error.get_or_insert(Unwritten::Events(error));
@@ -92,6 +100,10 @@ impl Recorder {
 
     fn put(&mut self, cycle: Option<u64>, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
         self.progress.update_values(samples, sources);
+        if let Some(plot) = &mut self.plot {
+            let known = samples.iter().filter_map(|sample| Some((sample, sources.get(sample.source)?)));
+            known.for_each(|(sample, source)| plot.push(sample, source));
+        }
         let mut result = self.rows.put(cycle, samples, sources);
         if let (Ok(()), Some(last)) = (&result, samples.last()) {
             result = self.rows.advance(last.at);

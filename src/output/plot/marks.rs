@@ -2,9 +2,7 @@
 
 use super::{Plot, Point};
 use crate::measure::sample::Status;
-
-/// The marked statuses, in the order of the legend.
-pub(super) const MARKED: [Status; 4] = [Status::OverloadHigh, Status::OverloadLow, Status::Clipped, Status::Invalid];
+use crate::output::recording::MARKED;
 
 /// The positions of marks, at least `distance` columns apart for each status. A mark without a value has the value
 /// before it.

@@ -1,9 +1,6 @@
-//! Reduces a curve to the points that a plot of limited width can show, and breaks it at gaps.
+//! Reduces a curve to the points that a plot of limited width can show.
 
 use super::Point;
-use crate::bus::Mono;
-use crate::measure::interval::IntervalTracker;
-use std::time::Duration;
 
 /// The values of one column of pixels: the first, the lowest, the highest and the last, each with its position.
 #[derive(Clone, Copy, Debug)]
@@ -35,26 +32,23 @@ impl Reduced {
     }
 }
 
-/// The connected parts of a curve. `x` is the column of a time; a gap is shown only if it is as wide as a column.
+/// The connected parts of a curve. `x` is the column of a time. A gap or a missing value is shown only if it is as wide
+/// as a column.
 pub(super) fn paths(points: &[Point], x: impl Fn(i64) -> f64) -> Vec<Vec<(f64, f64)>> {
     let (mut paths, mut path, mut open): (Vec<Vec<(f64, f64)>>, Vec<(f64, f64)>, Option<Reduced>) = Default::default();
-    let mut intervals = IntervalTracker::default();
-    let start = points.first().map_or(0, |point| point.at);
+    let mut is_broken = false;
     for point in points {
-        let since_start = Duration::from_micros(u64::try_from(point.at - start).unwrap_or(0));
-        let is_gap = intervals.add(Mono::at(since_start), None).is_some();
+        if !point.value.is_finite() {
+            is_broken = true;
+            continue;
+        }
         let at = (x(point.at), point.value);
         let is_visible = open.is_some_and(|open| at.0 - open.points[3].0 >= 1.0);
-        if !point.value.is_finite() || is_gap && is_visible {
+        if std::mem::take(&mut is_broken) && is_visible {
             if let Some(open) = open.take() {
                 open.push_to(&mut path);
             }
-            if !path.is_empty() {
-                paths.push(std::mem::take(&mut path));
-            }
-        }
-        if !point.value.is_finite() {
-            continue;
+            paths.push(std::mem::take(&mut path));
         }
         match &mut open {
             Some(column) if column.column == at.0.floor() => column.add(at),
@@ -121,18 +115,11 @@ mod tests {
 
     #[test]
     fn gaps_and_missing_values_break_the_line() {
-        let seconds = |times: &[i64]| -> Vec<(i64, f64)> { times.iter().map(|at| (at * 1_000_000, 1.0)).collect() };
-        let mut curve = points(&seconds(&[0, 1, 2, 3, 20, 21, 22, 23]));
-        let lengths = |curve: &[Point], second: f64| -> Vec<usize> {
-            paths(curve, |at| at as f64 / 1e6 * second).iter().map(Vec::len).collect()
-        };
-        assert_eq!(lengths(&curve, 10.0), [4, 4]);
-        assert_eq!(lengths(&curve, 0.01).len(), 1, "not visible");
-        curve[1].value = f64::NAN;
-        assert_eq!(lengths(&curve, 10.0), [1, 2, 4], "a single value is kept");
-        // A sender that becomes slower for good is not a row of gaps.
-        let slower = points(&seconds(&[0, 1, 2, 3, 5, 7, 9, 12, 15, 18, 21]));
-        assert_eq!(lengths(&slower, 10.0), [11]);
+        let curve = points(&[(0, 1.0), (1, f64::NAN), (2, 1.0), (3, 1.0), (20, f64::NAN), (20, 1.0), (21, 1.0)]);
+        let lengths =
+            |width: f64| -> Vec<usize> { paths(&curve, |at| at as f64 * width).iter().map(Vec::len).collect() };
+        assert_eq!(lengths(10.0), [1, 2, 2], "a single value is kept");
+        assert_eq!(lengths(0.01).len(), 1, "not visible");
         assert!(paths(&[], |_| 0.0).is_empty());
     }
 

@@ -112,7 +112,9 @@ pub fn terminal(plot: &Plot, width: usize, out: &mut dyn Write) -> io::Result<()
     // A space, the name of the curve and another space are before the label.
     let beside = if label > 0 { label + 3 } else { 0 };
     let frame = Frame { left, columns: (width - 1).saturating_sub(left + 2 + beside), label };
-    writeln!(out, "{}", shortened(&plot.title, width - 1))?;
+    if !plot.title.is_empty() {
+        writeln!(out, "{}", shortened(&plot.title, width - 1))?;
+    }
     if !plot.events.is_empty() {
         let mut line = vec![' '; frame.columns];
         for event in &plot.events {

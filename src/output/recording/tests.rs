@@ -5,7 +5,7 @@ const HEAD: &str = "time,elapsed_s,node,signal,value,unit,status,raw\n";
 fn read(files: &[&str], base: TimeBase) -> (Recording, Vec<Omitted>) {
     let mut recording = Recording::new(base);
     let omitted = files.iter().map(|file| recording.read(&mut file.as_bytes()).expect("a recording")).collect();
-    recording.sort();
+    recording.finish();
     (recording, omitted)
 }
 
@@ -111,4 +111,46 @@ fn events_have_their_node_if_any() {
     let expected = [event(1_700_000_000 * second, None, "link-down"), event(1_700_000_001 * second, Some(1), "emcy")];
     assert_eq!(read(&[file], TimeBase::Clock).0.events, expected);
     assert_eq!(read(&[file], TimeBase::Elapsed).0.events, [event(second, None, "link-down")]);
+}
+
+/// The values of a recording with a row every second: `1 gap 2`.
+fn with_gaps(seconds: &[u64]) -> String {
+    let row = |second: &u64| format!("{}.0,0,1,pressure,{second},bar,ok,0x00\n", 1_700_000_000 + second);
+    let (recording, _) = read(&[&format!("{HEAD}{}", seconds.iter().map(row).collect::<String>())], TimeBase::Clock);
+    let text = |point: &Point| if point.value.is_nan() { "gap".to_owned() } else { point.value.to_string() };
+    recording.curves[0].points.iter().map(text).collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn long_intervals_are_gaps() {
+    assert_eq!(with_gaps(&[0, 1, 2, 3, 20, 21, 22]), "0 1 2 3 gap 20 21 22");
+    // A sender that becomes slower for good is not a series of gaps.
+    assert_eq!(with_gaps(&[0, 1, 2, 4, 6, 9, 12, 15]), "0 1 2 4 6 9 12 15");
+}
+
+#[test]
+fn running_recording_keeps_extreme_values_gaps_and_statuses() {
+    let source = Source { node: crate::canopen::id::NodeId::MIN, signal: "pressure".into(), unit: "bar".into() };
+    let mut recording = Recording::new(TimeBase::Clock);
+    let mut push = |at: u64, value: f64, status: Status| {
+        let since = Duration::from_micros(at);
+        let at = Stamp { mono: Mono::at(since), wall: crate::bus::Wall::at(since) };
+        let value = Some(crate::measure::sample::Number::Real64(value));
+        let raw = crate::measure::sample::Raw::new(&[]);
+        recording.push(&Sample { at, source: 0, value, status: Some(status), raw, doubt: None }, &source);
+    };
+    let count = 200_000;
+    for at in 0..count {
+        let at = if at > 100_000 { at + 50_000 } else { at };
+        let value = if at == 5_555 { 99.0 } else { (at % 7) as f64 };
+        push(at * 1000, value, if at == 6_666 { Status::OverloadHigh } else { Status::Ok });
+    }
+    let points = &recording.curves[0].points;
+    assert!(points.len() < MOST_POINTS, "{}", points.len());
+    assert!(points.contains(&Point { at: 5_555_000, value: 99.0, status: None }));
+    assert!(points.iter().any(|point| point.at == 6_666_000 && point.status == Some(Status::OverloadHigh)));
+    assert!(points.iter().any(|point| point.value.is_nan() && point.at == 150_001_000));
+    assert!(points.is_sorted_by_key(|point| point.at));
+    let last = i64::try_from((count + 49_999) * 1000).expect("small");
+    assert_eq!((points[0].at, points[points.len() - 1].at), (0, last));
 }
