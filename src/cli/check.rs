@@ -32,7 +32,7 @@ use std::time::Duration as StdDuration;
 #[command(after_help = "\
 Expressions (quote each of them; all must be satisfied):
   'pressure in 9.95..10.05 bar'      both ends belong to the range
-  'temperature < 60 degC'            a number without unit is in the present unit of the device
+  'temperature < 60 degC'            always state the unit; without one, the unit of the device is used
   '|5.pressure - 6.pressure| < 0.1 bar'
                                      signals of two nodes; a signal without node is checked
                                      for each of NODES

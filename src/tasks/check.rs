@@ -10,7 +10,7 @@ use crate::canopen::value::DataType;
 use crate::master::{Error, Master};
 use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
-use crate::measure::expression::bind::AvailableSignals;
+use crate::measure::expression::bind::{AvailableSignals, BareLimit};
 use crate::measure::expression::evaluator::Evaluator;
 use crate::measure::expression::verdict::{MissingData, Outcome, Reason, Verdict};
 use crate::measure::sample::{Doubt, Sample, Source};
@@ -115,12 +115,16 @@ pub fn check(
     options.expressions.iter().try_for_each(|expression| expression.check_nodes(&options.nodes))?;
     match options.recording {
         Some((mode, duration)) => check_recording(master, options, mode, duration, observer),
-        None => check_reading(master, options),
+        None => check_reading(master, options, observer),
     }
 }
 
 /// Reads each signal once by SDO.
-fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<CheckReport, Failure> {
+fn check_reading(
+    master: &mut Master<'_>,
+    options: &CheckOptions,
+    observer: &mut dyn Observer,
+) -> Result<CheckReport, Failure> {
     master.listen_to(&options.nodes)?;
     let (mut known, mut failures, mut missing) = (Vec::new(), Vec::new(), Vec::new());
     for (&node, result) in options.nodes.iter().zip(survey_each(master, &options.nodes, &options.overrides)?) {
@@ -136,6 +140,8 @@ fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<Chec
     let available = available(&known, &options.expressions);
     evaluator.bind(&options.nodes, &available, options.skip_unsupported, &missing)?;
     let all = wanted_targets(&known, &evaluator)?;
+    let at = master.bus().now();
+    evaluator.bare_limits().into_iter().for_each(|limit| observer.event(&bare_limit(limit), at));
     let sources: Vec<Source> = all.iter().map(|target| target.source.clone()).collect();
     let asked: Vec<_> = all.iter().flat_map(objects).collect();
     let mut answers = Reader::new(master).read(&asked)?.into_iter();
@@ -163,6 +169,10 @@ fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<Chec
     let started = samples.first().map(|sample| sample.at);
     let length = started.zip(samples.last()).map_or(Duration::ZERO, |(first, last)| last.at.mono.since(first.mono));
     Ok(CheckReport { verdicts, started, length, failures, remarks })
+}
+
+fn bare_limit(limit: BareLimit) -> LogEvent {
+    LogEvent::Remark(Remark::BareLimit(limit))
 }
 
 /// All signals of these nodes, and the objects that the expressions name.
@@ -259,6 +269,8 @@ pub struct Checker<'a> {
     /// be unknown.
     received: BTreeSet<usize>,
     started: Option<Stamp>,
+    /// The reported limits without a unit.
+    bare_limits: Vec<BareLimit>,
     failure: Option<Failure>,
     observer: &'a mut dyn Observer,
 }
@@ -279,6 +291,7 @@ impl<'a> Checker<'a> {
             is_bound: false,
             received: BTreeSet::new(),
             started: None,
+            bare_limits: Vec::new(),
             failure: None,
             observer,
         }
@@ -304,9 +317,21 @@ impl<'a> Checker<'a> {
                 return ControlFlow::Break(());
             }
         }
+        if let Some(first) = samples.first().filter(|_| self.started.is_none() || self.received.len() > before) {
+            self.report_bare_limits(first.at);
+        }
         self.started = self.started.or(samples.first().map(|sample| sample.at));
         self.evaluator.add(samples, sources);
         ControlFlow::Continue(())
+    }
+
+    fn report_bare_limits(&mut self, at: Stamp) {
+        for limit in self.evaluator.bare_limits() {
+            if !self.bare_limits.contains(&limit) {
+                self.bare_limits.push(limit.clone());
+                self.observer.event(&bare_limit(limit), at);
+            }
+        }
     }
 
     /// The nodes whose setup could not be read, with the places of their failures in [`RecordingReport::failed`].

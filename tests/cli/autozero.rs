@@ -71,7 +71,7 @@ fn reading_beyond_the_limit_is_refused() {
         "autozero 1",
         "cangauge: node 1: pressure is 3.204 bar, limit 0.100 bar (1 % of the range): \
          nothing was changed\n\
-         hint: vent or isolate the line; if the limit is too low: cangauge autozero 1 --limit 3.4\n",
+         hint: vent or isolate the line; if the limit is too low: cangauge autozero 1 --limit 3.4bar\n",
     );
     let done = constant(3.204, 0.0, 0.0).run("autozero 1 --limit 3.4").exit(0);
     assert_eq!(done.stdout, "1  pressure  3.204 -> 0.000 bar  shift -3.204 bar  offset 0 -> -3.204\n");

@@ -35,26 +35,27 @@ fn check(bench: &Bench, words: &[&str]) -> super::Done {
 #[test]
 fn one_reading() {
     let bench = constant();
-    let done = check(&bench, &["5", "pressure in 1..1.5 bar", "temperature < 60", "|pressure| <= 1.25"]).prints(
-        "ok    pressure in 1..1.5 bar  1.25 bar\n\
-         ok    temperature < 60        25.5 degC\n\
-         ok    |pressure| <= 1.25      1.25 bar\n",
-    );
+    let done = check(&bench, &["5", "pressure in 1..1.5 bar", "temperature < 60 degC", "|pressure| <= 1.25 bar"])
+        .prints(
+            "ok    pressure in 1..1.5 bar  1.25 bar\n\
+         ok    temperature < 60 degC   25.5 degC\n\
+         ok    |pressure| <= 1.25 bar  1.25 bar\n",
+        );
     assert_eq!(done.stderr, "");
     assert_eq!(done.frames_of("000"), [""; 0], "reading sends no NMT");
-    let done = check(&bench, &["5", "pressure < 1.25", "temperature < 60", "pressure >= 1.3 bar"]).exit(1);
+    let done = check(&bench, &["5", "pressure < 1.25 bar", "temperature < 60 degC", "pressure >= 1.3 bar"]).exit(1);
     assert_eq!(
         done.stdout,
-        "FAIL  pressure < 1.25      1.25 bar\n\
-         ok    temperature < 60     25.5 degC\n\
-         FAIL  pressure >= 1.3 bar  1.25 bar\n"
+        "FAIL  pressure < 1.25 bar    1.25 bar\n\
+         ok    temperature < 60 degC  25.5 degC\n\
+         FAIL  pressure >= 1.3 bar    1.25 bar\n"
     );
     assert_eq!(
         done.stderr,
-        "cangauge: 2 of 3 checks failed: node 5: pressure < 1.25: 1.25 bar; node 5: pressure >= 1.3 bar: 1.25 bar\n"
+        "cangauge: 2 of 3 checks failed: node 5: pressure < 1.25 bar: 1.25 bar; node 5: pressure >= 1.3 bar: 1.25 bar\n"
     );
-    check(&bench, &["5", "0x6130:1 == 1.25 and pressure.status == 0"])
-        .prints("ok    0x6130:1 == 1.25 and pressure.status == 0  0x6130:1 1.25 bar, pressure.status 0\n");
+    check(&bench, &["5", "0x6130:1 == 1.25 bar and pressure.status == 0"])
+        .prints("ok    0x6130:1 == 1.25 bar and pressure.status == 0  0x6130:1 1.25 bar, pressure.status 0\n");
 }
 
 #[test]
@@ -279,6 +280,25 @@ fn log_with_expressions() {
     // An object that is not mapped is not received.
     let done = log(&["--expect", "0x1001:0 == 0"]).exit(3);
     assert!(done.stderr.contains("no data for 1 of 1 check"), "{}", done.stderr);
+}
+
+#[test]
+fn limits_without_a_unit_are_reported() {
+    let bench = constant();
+    let warning =
+        |number, unit| format!("warning: limit {number} has no unit; taken as {unit}, the unit of the device\n");
+    let done = check(&bench, &["5", "pressure < 5", "temperature in 20..30 degC"]).exit(0);
+    assert_eq!(done.stderr, warning("5", "bar"));
+    let done = check(&bench, &["5,127", "pressure > 5"]).exit(1);
+    assert!(done.stderr.starts_with(&(warning("5", "bar") + &warning("5", "psi"))), "{}", done.stderr);
+    assert_eq!(
+        check(&bench, &["5", "temperature < 60", "--for", "1s", "--poll", "200ms"]).stderr,
+        warning("60", "degC")
+    );
+    let log = |expression| bench.run_words(&["log", "5", "--sync", "10ms", "--count", "2", "--expect", expression]);
+    let done = log("pressure in 1..2").exit(0);
+    assert!(done.stderr.contains(&warning("1..2", "bar")), "{}", done.stderr);
+    assert!(!log("pressure in 1..2 bar").exit(0).stderr.contains("has no unit"));
 }
 
 #[test]

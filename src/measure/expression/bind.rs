@@ -1,8 +1,9 @@
 //! Connects an expression to the devices: finds its signals and converts its units.
 
-use super::dimension::{Dimension, Offsets, Typed, absolute, calculate, negative, to_one_unit, within};
+pub use super::dimension::BareLimit;
+use super::dimension::{Dimension, Offsets, Typed, absolute, bare_limit, calculate, negative, to_one_unit, within};
 use super::formula::{Formula, Rule};
-use super::tree::{Condition, Function, Quantity, SignalName};
+use super::tree::{Condition, Function, Operator, Quantity, SignalName};
 use super::{Expression, ExpressionError, LocatedError};
 use crate::canopen::id::NodeId;
 use crate::device::dictionary::{Dictionary, spellings};
@@ -181,6 +182,8 @@ pub struct BoundExpression {
     pub node: Option<NodeId>,
     /// The values to measure.
     pub inputs: Vec<Input>,
+    /// The limits without a unit.
+    pub bare_limits: Vec<BareLimit>,
     /// The parts that are evaluated with each sample.
     pub(super) sample_rules: Vec<Rule>,
     /// The parts that are evaluated after the last sample.
@@ -237,6 +240,7 @@ impl Expression {
                 text: self.text.clone(),
                 node,
                 inputs: Vec::new(),
+                bare_limits: Vec::new(),
                 sample_rules: Vec::new(),
                 final_rules: Vec::new(),
                 aggregates: Vec::new(),
@@ -265,13 +269,17 @@ impl Binder<'_> {
     fn rule(&mut self, condition: &Condition) -> Result<Rule, LocatedError> {
         Ok(match condition {
             Condition::Compare(left, relation, right, _) => {
-                let (left, right) = to_one_unit(self.typed(left)?, self.typed(right)?)?;
+                let (left, right) = (self.typed(left)?, self.typed(right)?);
+                self.add_bare_limits(condition, &[&left, &right]);
+                let (left, right) = to_one_unit(left, right)?;
                 let exact = left.exact && right.exact;
                 let [left, right] = [left, right].map(|side| self.show(side));
                 Rule::Compare(left, *relation, right, exact)
             }
             Condition::Within(value, low, high, _) => {
-                let sides = within(self.typed(value)?, self.typed(low)?, self.typed(high)?)?;
+                let (value, low, high) = (self.typed(value)?, self.typed(low)?, self.typed(high)?);
+                self.add_bare_limits(condition, &[&value, &low, &high]);
+                let sides = within(value, low, high)?;
                 let exact = sides.iter().all(|side| side.exact);
                 let [value, low, high] = sides.map(|side| self.show(side));
                 Rule::Within(value, low, high, exact)
@@ -280,6 +288,15 @@ impl Binder<'_> {
             Condition::Or(left, right) => Rule::Or(Box::new(self.rule(left)?), Box::new(self.rule(right)?)),
             Condition::Not(inner) => Rule::Not(Box::new(self.rule(inner)?)),
         })
+    }
+
+    /// Adds the limits without a unit. Intervals and rates have the same unit at every device.
+    fn add_bare_limits(&mut self, condition: &Condition, sides: &[&Typed]) {
+        let mut functions = Vec::new();
+        condition.functions(&mut functions);
+        if !functions.iter().any(|function| matches!(function, Function::Rate | Function::Gap)) {
+            self.bound.bare_limits.extend(bare_limit(sides));
+        }
     }
 
     /// Adds a measured quantity to those that the verdict shows. Returns its formula.
@@ -321,6 +338,9 @@ impl Binder<'_> {
             }
             Quantity::Arithmetic(left, operator, right, sign) => {
                 let (left, right) = (self.typed(left)?, self.typed(right)?);
+                if matches!(operator, Operator::Add | Operator::Subtract) {
+                    self.bound.bare_limits.extend(bare_limit(&[&left, &right]));
+                }
                 calculate(left, *operator, right, *sign, name)?
             }
             Quantity::Aggregate(function, inner, _) => {
@@ -389,5 +409,37 @@ fn aggregate_dimension(function: Function, of: Dimension) -> Dimension {
         (Function::Count | Function::Invalid, _) => Dimension::None,
         (Function::Noise, Dimension::In(unit, _)) => Dimension::In(unit, Offsets::Known(0.0)),
         (_, of) => of,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The numbers of an expression that take the unit of the device.
+    fn bare(text: &str, unit: &str) -> Vec<String> {
+        let node = NodeId::new(5).expect("a node-ID");
+        let available = AvailableSignals::from_sources(&[Source { node, signal: "p".into(), unit: unit.into() }]);
+        let expression = Expression::parse(text).expect("an expression");
+        let limits = expression.bind(Some(node), &available).expect("fits").bare_limits;
+        limits.iter().map(|limit| format!("{} {}", limit.limit, limit.unit)).collect()
+    }
+
+    #[test]
+    fn numbers_without_a_unit_are_found() {
+        for (text, found) in [
+            ("p > 5", &["5 bar"][..]),
+            ("-1.5 <= p and not p == 7", &["-1.5 bar", "7 bar"]),
+            ("p in 9..11", &["9..11 bar"]),
+            ("|p - 10| < 0.1 bar", &["10 bar"]),
+            ("noise(p) < 2 * 0.1 or mean(p) < 3", &["2 * 0.1 bar", "3 bar"]),
+        ] {
+            assert_eq!(bare(text, "bar"), found, "{text}");
+        }
+        assert_eq!(bare("p < 60", "degC"), ["60 degC"]);
+        for text in ["p > 5 psi", "p in 9..11 bar", "p in 9 psi..11", "count(p) > 5", "gap(p) < 0.5", "2 * p > 5 bar"] {
+            assert_eq!(bare(text, "bar"), [""; 0], "{text}");
+        }
+        assert_eq!(bare("p == 5", ""), [""; 0], "a signal without a unit");
     }
 }

@@ -52,6 +52,14 @@ impl Typed {
         matches!(self.dimension, Dimension::In(_, Offsets::Literal))
     }
 
+    /// The unit of the device, if the quantity was measured in it.
+    fn measured_unit(&self) -> Option<Unit> {
+        match self.dimension {
+            Dimension::In(unit, _) if !self.is_literal() && unit != Unit::NONE => Some(unit),
+            _ => None,
+        }
+    }
+
     /// Text for errors: `p is in bar` or `p has no unit`.
     fn describe_unit(&self) -> String {
         match self.dimension {
@@ -95,6 +103,24 @@ fn ambiguous(first: &Typed, second: &Typed, from: Unit, to: Unit) -> LocatedErro
     let (literal, unit) = if first.is_literal() { (first, to) } else { (second, from) };
     let message = format!("{} is ambiguous: a temperature or a temperature difference", literal.name);
     LocatedError::new(literal.at, message).hint(format!("write it in {unit}"))
+}
+
+/// A number without a unit, and the unit of the device that it takes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BareLimit {
+    /// The number as in the expression.
+    pub limit: String,
+    /// The unit.
+    pub unit: Unit,
+}
+
+/// The number or the range (`9..11`) among `sides` that takes the unit of the device, because no side states a unit.
+pub(super) fn bare_limit(sides: &[&Typed]) -> Option<BareLimit> {
+    let unit = sides.iter().find_map(|side| side.measured_unit())?;
+    let bare = sides.iter().filter(|side| side.dimension == Dimension::Literal);
+    let limit = bare.map(|side| side.name.as_str()).collect::<Vec<_>>().join("..");
+    let is_stated = limit.is_empty() || sides.iter().any(|side| side.is_literal());
+    (!is_stated).then_some(BareLimit { limit, unit })
 }
 
 /// Converts two quantities to one unit: that of a number with a unit, else that of the first quantity.

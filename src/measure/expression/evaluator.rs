@@ -5,7 +5,7 @@
 //! - A comparison of several signals is evaluated when each signal has a new value. If a signal has a second value
 //!   before that, its first value is compared with the latest other values. So no sample is skipped.
 
-use super::bind::{AvailableSignals, BoundExpression, unit_of};
+use super::bind::{AvailableSignals, BareLimit, BoundExpression, unit_of};
 use super::comparison::Comparison;
 use super::verdict::{LiveResult, MissingData, Reason, Verdict};
 use super::{Expression, ExpressionError};
@@ -136,6 +136,17 @@ impl Evaluator {
     /// All bound expressions.
     pub fn bound(&self) -> impl Iterator<Item = &BoundExpression> {
         self.comparisons.iter().map(Comparison::bound)
+    }
+
+    /// The limits without a unit, without repetitions.
+    pub fn bare_limits(&self) -> Vec<BareLimit> {
+        let mut limits = Vec::new();
+        for limit in self.bound().flat_map(|bound| &bound.bare_limits) {
+            if !limits.contains(limit) {
+                limits.push(limit.clone());
+            }
+        }
+        limits
     }
 
     /// The signals of a node to measure, without repetitions.

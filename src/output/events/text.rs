@@ -6,6 +6,7 @@ use crate::bus::{Fault, ReceiveBuffer};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
 use crate::canopen::pdo::TpdoNumber;
+use crate::measure::expression::bind::BareLimit;
 use crate::output::diagnosis;
 use crate::output::failure::ErrorMessage;
 use crate::tasks::Failure;
@@ -183,6 +184,9 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::SyncsOmittedTooSlow(count) => format!("{count} SYNC omitted: the program was stopped or too slow"),
         Remark::SmallReceiveBuffer(buffer) => format!("frames were dropped: {}", buffer_text(*buffer)),
         Remark::Doubt(node, signal, doubt) => crate::output::doubt::doubt(*node, signal, *doubt),
+        Remark::BareLimit(BareLimit { limit, unit }) => {
+            format!("limit {limit} has no unit; taken as {unit}, the unit of the device")
+        }
         Remark::MayClip(node, value) => {
             format!("node {node}: {}", crate::output::doubt::may_clip(value))
         }

@@ -124,7 +124,8 @@ fn remedy(target: ZeroTarget, objection: &Objection, node: &str, choice: &str) -
         Objection::Absolute => "apply a vacuum and use --force".to_owned(),
         Objection::Invalid { .. } => format!("show the errors of the device: cangauge errors {node}"),
         Objection::RangeUnknown { .. } => "add the largest reading to accept as zero: --limit VALUE".to_owned(),
-        Objection::TooFar { enough, .. } => {
+        Objection::TooFar { enough, limit, .. } => {
+            let enough = limit.unit.map_or_else(|| enough.clone(), |unit| format!("{enough}{unit}"));
             format!(
                 "vent or isolate the line; if the limit is too low: cangauge autozero {node}{choice} --limit {enough}"
             )

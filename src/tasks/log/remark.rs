@@ -4,6 +4,7 @@ use crate::bus::ReceiveBuffer;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::TpdoNumber;
 use crate::master::SdoError;
+use crate::measure::expression::bind::BareLimit;
 use crate::measure::layout::NarrowValue;
 use crate::measure::sample::Doubt;
 use crate::tasks::Failure;
@@ -50,6 +51,8 @@ pub enum Remark {
     SmallReceiveBuffer(ReceiveBuffer),
     /// A value of this signal is missing or may be wrong.
     Doubt(NodeId, String, Doubt),
+    /// A limit of an expression has no unit.
+    BareLimit(BareLimit),
     /// The values of a signal may be clipped.
     MayClip(NodeId, NarrowValue),
     /// The node, or only this signal, sent no measurements for this reason.
