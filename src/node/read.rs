@@ -146,7 +146,7 @@ impl<'a, A: Ask> Reader<'a, A> {
         }
         for error in results.iter().filter_map(|result| result.as_ref().err()) {
             let is_answered = matches!(error.failure, SdoFailure::Refused(_) | SdoFailure::Fit(_));
-            if !is_answered && !matches!(error.failure, SdoFailure::Cancelled | SdoFailure::TwoDevices(_)) {
+            if !is_answered && !matches!(error.failure, SdoFailure::Cancelled | SdoFailure::TwoDevices(Some(_))) {
                 self.master.add_unknown(error.node, error.object);
             }
         }
