@@ -18,6 +18,8 @@ use crate::output::plot::{Plot, TimeAxis};
 use crate::output::progress::Progress;
 use crate::output::recording::{Recording, TimeBase};
 use crate::output::rows::FileFormat;
+use crate::output::stderr_size;
+use crate::output::summary::SummaryForm;
 use crate::tasks::check::Checker;
 use crate::tasks::log::{LogOptions, Mode, log};
 use crate::tasks::{Failure, Kind};
@@ -181,7 +183,9 @@ impl Log {
         }
         let mut finished = Finished { report, verdicts: Vec::new(), written, deleted, is_limited, is_closed };
         let console = global.console();
-        finished.summary().lines().iter().for_each(|line| console.note(line));
+        let form = SummaryForm { verbose: global.verbose > 0, width: stderr_size().map(|(width, _)| width) };
+        finished.summary().lines(form).iter().for_each(|line| console.note(line));
+        files.written().iter().for_each(|files| console.note(&format!("written to {files}")));
         let title = self.files.output.as_ref().map(|file| file.display().to_string()).unwrap_or_default();
         let axis = TimeAxis::Clock(ahead_of_utc);
         let plot = plot.and_then(|recording| Plot::new(recording, title, axis, [None; 2]));

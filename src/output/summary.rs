@@ -2,7 +2,8 @@
 
 use super::events::remark_text;
 use super::report::{Cell, Column, Format, Report, render};
-use super::text::{grouped, significant};
+use super::table::{self, Align, align_decimals};
+use super::text::{folded, grouped, significant};
 use crate::bus::time::format_duration;
 use crate::measure::histogram::Histogram;
 use crate::measure::sample::{Number, Source};
@@ -122,7 +123,10 @@ impl Report for Summary<'_> {
 
     /// The lines at the end of a recording.
     fn text(summaries: &[Self], out: &mut dyn Write) -> io::Result<()> {
-        summaries.iter().flat_map(Summary::lines).try_for_each(|line| writeln!(out, "{line}"))
+        summaries
+            .iter()
+            .flat_map(|summary| summary.lines(SummaryForm::default()))
+            .try_for_each(|line| writeln!(out, "{line}"))
     }
 }
 
@@ -175,28 +179,122 @@ fn left_operational(report: &RecordingReport) -> Cell {
     Cell::list(nodes.flatten().copied())
 }
 
+/// The form of the summary on stderr.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SummaryForm {
+    /// Also the figures that are otherwise only in the JSON summary.
+    pub verbose: bool,
+    /// The longest line in characters; `None` without a terminal.
+    pub width: Option<usize>,
+}
+
 impl Summary<'_> {
     /// The summary as lines of text.
-    pub fn lines(&self) -> Vec<String> {
+    pub fn lines(&self, form: SummaryForm) -> Vec<String> {
         let Summary { report, written, .. } = self;
-        let mut lines = vec![head(report, *written)];
+        let mut before = vec![head(report, *written)];
         if report.events.not_recorded > 0 {
             let count = grouped(report.events.not_recorded);
-            lines.push(format!(
+            before.push(format!(
                 "{count} TPDOs or polled values were ignored while the setup of their node was read again"
             ));
         }
-        lines.extend(syncs(&report.syncs));
-        lines.extend(report.statistics.iter().map(|(source, statistics)| signal_line(source, statistics)));
+        before.extend(syncs(&report.syncs).filter(|_| form.verbose));
+        let mut after = Vec::new();
         if written.left_out > 0 {
-            lines.push(format!(
+            after.push(format!(
                 "{} values are not in any row: late, or not the first in their cycle (--layout long contains all values)",
                 grouped(written.left_out)
             ));
         }
-        lines.extend(report.remarks.iter().map(remark_text));
-        lines
+        after.extend(report.remarks.iter().map(remark_text));
+        let folded = |lines: Vec<String>| -> Vec<String> {
+            lines.iter().flat_map(|line| folded(line, form.width.unwrap_or(usize::MAX))).collect()
+        };
+        let table = signal_table(&report.statistics, form);
+        folded(before).into_iter().chain(table).chain(folded(after)).collect()
     }
+}
+
+/// A column of the table of signals.
+struct SignalColumn {
+    heading: &'static str,
+    align: Align,
+    /// Columns with the highest rank are omitted first on a narrow terminal.
+    rank: u8,
+    cells: Vec<String>,
+}
+
+impl SignalColumn {
+    fn width(&self) -> usize {
+        self.cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0).max(self.heading.len())
+    }
+}
+
+/// The table of signals. Columns that do not fit are omitted; they are in the JSON summary.
+fn signal_table(signals: &[(Source, Statistics)], form: SummaryForm) -> Vec<String> {
+    use Align::{Left, Right};
+    let column = |heading, align, rank, cell: &dyn Fn(&Source, &Statistics) -> String| {
+        let cells = signals.iter().map(|(source, statistics)| cell(source, statistics)).collect();
+        SignalColumn { heading, align, rank, cells }
+    };
+    let number = |heading, rank, digits, value: &dyn Fn(&Statistics) -> Option<f64>| {
+        let mut column = column(heading, Left, rank, &|_, statistics| {
+            value(statistics).map_or_else(|| "-".to_owned(), |value| significant(value, digits))
+        });
+        align_decimals(&mut column.cells);
+        column
+    };
+    let time = |time: Option<Duration>| time.map_or_else(|| "-".to_owned(), format_duration);
+    let jitter = |statistics: &Statistics, of: &dyn Fn(Jitter) -> Duration| time(statistics.jitter().map(of));
+    let is_any = |count: &dyn Fn(&Statistics) -> u64| signals.iter().any(|(_, statistics)| count(statistics) > 0);
+    let mut columns = vec![
+        column("NODE", Right, 0, &|source, _| source.node.to_string()),
+        column("SIGNAL", Left, 0, &|source, _| source.signal.to_string()),
+        column("N", Right, 0, &|_, statistics| grouped(statistics.count())),
+        number("MEAN", 0, 6, &Statistics::mean),
+        number("SD", 3, 3, &Statistics::deviation),
+        number("MIN", 1, 6, &Statistics::min),
+        number("MAX", 1, 6, &Statistics::max),
+        column("UNIT", Left, 0, &|source, _| source.unit.to_string()),
+        column("RATE", Right, 2, &|_, statistics| {
+            statistics.rate().map_or_else(|| "-".to_owned(), |rate| format!("{}/s", significant(rate, 4)))
+        }),
+        column("INTERVAL", Right, 4, &|_, statistics| time(statistics.intervals().quantile(0.5).map(rounded))),
+    ];
+    if is_any(&Statistics::gaps) {
+        columns.push(column("GAPS", Right, 0, &|_, statistics| grouped(statistics.gaps())));
+    }
+    if is_any(&Statistics::invalid) {
+        columns.push(column("INVALID", Right, 0, &|_, statistics| grouped(statistics.invalid())));
+    }
+    if form.verbose {
+        columns.push(column("JITTER P99", Right, 5, &|_, statistics| jitter(statistics, &|jitter| jitter.p99)));
+        columns.push(column("JITTER MAX", Right, 6, &|_, statistics| jitter(statistics, &|jitter| jitter.max)));
+    }
+    let length = |columns: &[SignalColumn]| columns.iter().map(|column| column.width() + 2).sum::<usize>();
+    while length(&columns) > form.width.unwrap_or(usize::MAX).saturating_add(2)
+        && let Some(most) = columns.iter().map(|column| column.rank).max().filter(|rank| *rank > 0)
+    {
+        columns.retain(|column| column.rank != most);
+    }
+    let head = columns.iter().map(|column| column.heading.to_owned()).collect();
+    let rows = (0..signals.len()).map(|row| columns.iter().map(|column| column.cells[row].clone()).collect());
+    let rows: Vec<Vec<String>> = std::iter::once(head).chain(rows).collect();
+    let align: Vec<Align> = columns.iter().map(|column| column.align).collect();
+    let mut out = Vec::new();
+    // Writing to memory cannot fail.
+    let _ = table::write(&mut out, &align, &rows);
+    let width = form.width.unwrap_or(usize::MAX);
+    String::from_utf8_lossy(&out).lines().map(|line| line.chars().take(width).collect()).collect()
+}
+
+/// A time with three digits, for people.
+fn rounded(time: Duration) -> Duration {
+    let digits = time.as_micros().checked_ilog10().unwrap_or(0);
+    let unit = 10u64.pow(digits.saturating_sub(2)) * 1000;
+    let nanoseconds = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+    Duration::from_nanos((nanoseconds.saturating_add(unit / 2)) / unit * unit)
 }
 
 fn head(report: &RecordingReport, written: Written) -> String {
@@ -243,35 +341,62 @@ fn syncs(syncs: &SyncStatistics) -> Option<String> {
     Some(format!("{} SYNC sent, delay min {min}  p50 {p50}  p99 {p99}  max {max}", grouped(syncs.sent)))
 }
 
-fn signal_line(source: &Source, statistics: &Statistics) -> String {
-    let mut line = format!("node {} {}  n {}", source.node, source.signal, grouped(statistics.count()));
-    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| significant(value, 6));
-    if statistics.mean().is_some() {
-        let mean = number(statistics.mean());
-        let deviation = statistics.deviation().map_or_else(|| "-".to_owned(), |value| significant(value, 3));
-        let (min, max) = (number(statistics.min()), number(statistics.max()));
-        line.push_str(&format!("  mean {mean}  sd {deviation}  min {min}  max {max} {}", source.unit));
-    }
-    if let Some(rate) = statistics.rate() {
-        line = format!("{}  {}/s", line.trim_end(), significant(rate, 4));
-    }
-    if let Some(Jitter { median, p99, max, .. }) = statistics.jitter() {
-        let (median, p99, max) = (format_duration(median), format_duration(p99), format_duration(max));
-        line.push_str(&format!("  every {median}, jitter p99 {p99}  max {max}"));
-    }
-    if statistics.gaps() > 0 {
-        line.push_str(&format!("  {}", counted(statistics.gaps(), "gap", "gaps")));
-    }
-    if statistics.invalid() > 0 {
-        line.push_str(&format!("  {} invalid", grouped(statistics.invalid())));
-    }
-    line.trim_end().to_owned()
-}
-
 /// Writes the summary as one JSON object.
 ///
 /// # Errors
 /// Those of `out`.
 pub fn write_json(summary: &Summary<'_>, out: &mut dyn Write) -> io::Result<()> {
     render(std::slice::from_ref(summary), Format::Json, out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::canopen::id::NodeId;
+
+    fn signals() -> Vec<(Source, Statistics)> {
+        let source = |node, signal: &str| {
+            let node = NodeId::new(node).expect("a node-ID");
+            Source { node, signal: signal.into(), unit: "bar".into() }
+        };
+        let mut statistics = Statistics::default();
+        (0..5).for_each(|at| statistics.add(Some(1.5), Duration::from_millis(at * 100)));
+        let mut higher = statistics.clone();
+        higher.add(Some(1234.5), Duration::from_millis(502));
+        higher.add(None, Duration::from_millis(600));
+        higher.add_gap();
+        vec![
+            (source(1, "pressure"), statistics),
+            (source(127, "ch1"), higher),
+            (source(2, "ch2"), Statistics::default()),
+        ]
+    }
+
+    fn table(verbose: bool, width: Option<usize>) -> Vec<String> {
+        signal_table(&signals(), SummaryForm { verbose, width })
+    }
+
+    #[test]
+    fn table_of_signals_has_aligned_decimals() {
+        assert_eq!(
+            table(false, None),
+            [
+                "NODE  SIGNAL    N  MEAN       SD   MIN      MAX         UNIT     RATE  INTERVAL  GAPS  INVALID",
+                "   1  pressure  5    1.50000    0  1.50000     1.50000  bar   10.00/s    100 ms     0        0",
+                " 127  ch1       7  207.000    503  1.50000  1234.50     bar   10.00/s    100 ms     1        1",
+                "   2  ch2       0    -          -  -           -        bar         -         -     0        0",
+            ]
+        );
+        assert!(table(true, None)[1].ends_with("  0 us        0 us"), "{:?}", table(true, None));
+    }
+
+    #[test]
+    fn narrow_table_omits_columns() {
+        for width in 20..120 {
+            let lines = table(true, Some(width));
+            assert!(lines.iter().all(|line| line.chars().count() <= width), "{lines:?}");
+            assert!(lines[0].starts_with("NODE  SIGNAL    N ") && lines.len() == 4, "{lines:?}");
+        }
+        assert!(!table(false, Some(79))[0].contains("INTERVAL") && table(false, Some(79))[0].contains("RATE"));
+    }
 }

@@ -33,9 +33,28 @@ pub fn write(out: &mut dyn Write, align: &[Align], rows: &[Vec<String>]) -> io::
     Ok(())
 }
 
+/// Adds spaces so that the decimal points of left-aligned numbers are below each other.
+pub fn align_decimals(cells: &mut [String]) {
+    let split = |cell: &str| {
+        let point = cell.find('.').unwrap_or(cell.len());
+        (point, cell.len() - point)
+    };
+    let before = cells.iter().map(|cell| split(cell).0).max().unwrap_or(0);
+    for cell in cells {
+        *cell = format!("{}{cell}", " ".repeat(before - split(cell).0));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn decimal_points_are_aligned() {
+        let mut cells = ["1.234", "-17.8", "25", "-"].map(str::to_owned);
+        align_decimals(&mut cells);
+        assert_eq!(cells, ["  1.234", "-17.8", " 25", "  -"]);
+    }
 
     #[test]
     fn columns_are_aligned() {

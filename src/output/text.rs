@@ -45,6 +45,22 @@ pub fn one_line(text: &str) -> String {
     format!("{} … {}", part(&letters[..half]), part(&letters[letters.len() - half..]))
 }
 
+/// A line as lines of at most `width` characters, broken at spaces. Further lines are indented.
+pub fn folded(line: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in line.split(' ') {
+        match lines.last_mut() {
+            Some(last) if last.chars().count().saturating_add(1 + word.chars().count()) <= width => {
+                last.push(' ');
+                last.push_str(word);
+            }
+            Some(_) => lines.push(format!("  {word}")),
+            None => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
 /// The part of a long input around the place after `before` characters, and the number of its characters before the
 /// place.
 pub fn around(text: &str, before: usize) -> (String, usize) {
@@ -129,6 +145,13 @@ mod tests {
         assert_eq!((part.chars().count(), part.chars().nth(before)), (200, Some('!')));
         assert_eq!(around("a < b", 2), ("a < b".to_owned(), 2));
         assert_eq!(around(&input, 10_001).0.chars().count(), 101 - 1);
+    }
+
+    #[test]
+    fn lines_are_folded_at_spaces() {
+        assert_eq!(folded("20 rows in 1.9 s, 0 gaps", 16), ["20 rows in 1.9", "  s, 0 gaps"]);
+        assert_eq!(folded("a  b", usize::MAX), ["a  b"]);
+        assert_eq!(folded("abcdef gh", 3), ["abcdef", "  gh"]);
     }
 
     #[test]

@@ -177,7 +177,7 @@ fn sent(done: &Done, frame: &str) -> Vec<u64> {
 
 #[test]
 fn sync_count_is_exact_and_does_not_drift() {
-    let done = one("mh4", "").run("log 5 --sync 10ms --duration 1s").exit(0);
+    let done = one("mh4", "").run("log 5 --sync 10ms --duration 1s -v").exit(0);
     let syncs = sent(&done, "080#");
     assert_eq!(syncs.len(), 100);
     assert!(syncs.windows(2).all(|pair| pair[1] - pair[0] == 10_000), "{syncs:?}");

@@ -100,7 +100,8 @@ fn summary_has_the_statistics_of_the_rows() {
     let done = bench.run("log 127 --count 20 --summary sum.json").exit(0);
     let lines: Vec<&str> = done.stderr.lines().collect();
     assert_eq!(lines[0], "20 rows in 1.9 s, simulated timestamps, 0 frames dropped, 0 gaps");
-    assert!(lines[1].starts_with("node 127 pressure  n 20  mean "), "{}", lines[1]);
+    assert!(lines[1].starts_with("NODE  SIGNAL     N  MEAN "), "{}", lines[1]);
+    assert!(lines[2].starts_with(" 127  pressure  20  "), "{}", lines[2]);
     let summary: serde_json::Value = serde_json::from_str(&bench.text("sum.json")).expect("JSON");
     assert_eq!(
         (&summary["rows"], &summary["timestamps"], &summary["dropped"], &summary["gaps"], &summary["lost_nodes"]),
@@ -142,9 +143,10 @@ fn summary_has_the_statistics_of_the_rows() {
 fn gaps_jitter_and_syncs_in_the_summary() {
     let bench = Bench::of("dps@127,mh4@5");
     // 19 intervals of 100 ms are longer than the allowed 99 ms.
-    let done = bench.run("log 127 --count 20 --max-gap 99ms --summary sum.json").exit(0);
+    let done = bench.run("log 127 --count 20 --max-gap 99ms --summary sum.json -v").exit(0);
     assert!(done.stderr.contains(", 19 gaps\n"), "{}", done.stderr);
-    assert!(done.stderr.contains("  every 100 ms, jitter p99 "), "{}", done.stderr);
+    assert!(done.stderr.contains("  INTERVAL  GAPS  JITTER P99  JITTER MAX\n"), "{}", done.stderr);
+    assert!(done.stderr.contains("  psi   10.00/s    100 ms    19  "), "{}", done.stderr);
     let summary: serde_json::Value = serde_json::from_str(&bench.text("sum.json")).expect("JSON");
     let signal = &summary["signals"][0];
     assert_eq!((&summary["gaps"], &signal["gaps"], &summary["sync_delay_s"]), (&json!(19), &json!(19), &json!(null)));
@@ -155,7 +157,7 @@ fn gaps_jitter_and_syncs_in_the_summary() {
     // Four TPDOs, ten times each: gaps are counted per TPDO, not per value.
     let done = Bench::of("mc1609@3").run("log 3 --count 160 --max-gap 99ms").exit(0);
     assert!(done.stderr.contains(", 36 gaps\n"), "{}", done.stderr);
-    let done = bench.run("log 5 --sync 10ms --count 50 --summary - -o run.csv").exit(0);
+    let done = bench.run("log 5 --sync 10ms --count 50 --summary - -o run.csv -v").exit(0);
     let summary = &done.json()[0];
     assert_eq!((&summary["syncs"], &summary["syncs_left_out"]), (&json!(50), &json!(0)));
     assert!(summary["sync_delay_s"]["max"].as_f64().is_some_and(|delay| delay < 0.001), "{summary}");
@@ -175,7 +177,7 @@ fn overload_is_reported_at_once() {
     // (1 SYNC of at most 50 bits and 1 TPDO of at most 135) in 10 ms, of 250 kbit/s.
     assert!(done.stderr.starts_with("SYNC every 10 ms with its TPDOs takes 7.4 % of the bus\n"), "{}", done.stderr);
     assert!(done.stderr.contains("node 5: emergency over (0000h)"), "{}", done.stderr);
-    assert!(done.stderr.contains("  10 invalid"), "{}", done.stderr);
+    assert!(done.stderr.contains("  INVALID\n") && done.stderr.contains("     10 ms       10\n"), "{}", done.stderr);
 }
 
 #[cfg(unix)]

@@ -144,6 +144,8 @@ pub(super) struct OpenFiles {
     pub(super) events: Option<OutFile>,
     pub(super) summary: Option<ReportFile>,
     series: Option<Series>,
+    /// The name from which the names of rotated files follow. With --force, further files may be older.
+    rotated: Option<PathBuf>,
     setup: Setup,
     /// The number of bytes of the existing file that are kept.
     keep: u64,
@@ -232,6 +234,7 @@ impl Files {
             events: None,
             summary: None,
             series: None,
+            rotated: self.output.clone().filter(|_| self.rotate.is_some() && !self.force),
             setup,
             keep: 0,
             existing_events: None,
@@ -347,6 +350,18 @@ impl OpenFiles {
         let target = file.target(kept.map_or(0, |kept| kept.length))?;
         let writer = line_writer(target, None, waits)?;
         Ok(Some(Events::new(writer, dialect, self.setup.time, kept.is_some())))
+    }
+
+    /// The files of the rows; `None` for stdout.
+    pub(super) fn written(&self) -> Option<String> {
+        let first = self.rows.as_ref()?.path().display();
+        let base = self.rotated.as_ref().map(|base| Series::existing(base).unwrap_or_default());
+        let last = base.and_then(|numbers| numbers.last().copied()).zip(self.rotated.as_ref());
+        let last = last.map(|(number, base)| Series::name(base, number).display().to_string());
+        Some(match last.filter(|last| *last != first.to_string()) {
+            Some(last) => format!("{first} and the following files up to {last}"),
+            None => first.to_string(),
+        })
     }
 
     /// The name of the file of the rows.
