@@ -532,8 +532,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l color -d 'Use 
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l passive -d 'Send nothing at all'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l start -d 'Start every node, also drives and inputs or outputs [default: sensors]'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Do not change the NMT state of the nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l start -d 'Start every node, also drives and inputs or outputs, and beside another NMT master [default: sensors]'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Do not change the NMT state of the nodes [default: if another NMT master is seen]'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l plot -d 'Plot the values at the end, on stderr (see cangauge plot)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite existing files'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l append -d 'Append to existing files with the same columns. An incomplete last line is removed'

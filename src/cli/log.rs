@@ -31,8 +31,9 @@ use std::io::{self, IsTerminal};
 
 /// Record measurements as CSV or JSON Lines
 ///
-/// Without --sync, --poll and --request, log records the TPDOs as the nodes send them. It starts all nodes that are not
-/// known to be operational. At the end it restores their previous NMT states, if known.
+/// Without --sync, --poll and --request, log records the TPDOs as the nodes send them. It starts sensors that are not
+/// known to be operational, unless another NMT master is seen. At the end it restores their previous NMT states, if
+/// known.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Columns: time (UTC), elapsed_s, node, signal, value, unit, status (ok, invalid, overload-high,
@@ -77,10 +78,10 @@ pub(crate) struct Log {
     /// Send nothing at all
     #[arg(long)]
     pub(super) passive: bool,
-    /// Start every node, also drives and inputs or outputs [default: sensors]
+    /// Start every node, also drives and inputs or outputs, and beside another NMT master [default: sensors]
     #[arg(long, conflicts_with_all = ["no_nmt", "passive", "poll"])]
     start: bool,
-    /// Do not change the NMT state of the nodes
+    /// Do not change the NMT state of the nodes [default: if another NMT master is seen]
     #[arg(long)]
     no_nmt: bool,
     /// Report longer intervals as gaps [default: 3 times the usual interval]

@@ -25,6 +25,7 @@ pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, TransferKind, read_ob
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::NmtCommand;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{FitError, Note, Uploaded, fit};
 use crate::canopen::value::{DataType, Value};
@@ -105,6 +106,8 @@ pub struct Master<'bus> {
     outgoing: Outgoing,
     /// A frame that was received after the deadline. It is handled next.
     pending: Option<Received>,
+    /// The last NMT command of another master.
+    foreign_nmt: Option<(NmtCommand, Option<NodeId>)>,
     /// The latest known moment, stored to read the clock less often.
     seen: Mono,
 }
@@ -113,7 +116,8 @@ impl<'bus> Master<'bus> {
     /// A master on `bus`.
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
         let (sdo, filters, outgoing) = (SdoClient::default(), Filters::All, Outgoing::new());
-        Master { bus, timing, sdo, filters, receives_all: false, outgoing, pending: None, seen: Mono::START }
+        let (pending, foreign_nmt, seen) = (None, None, Mono::START);
+        Master { bus, timing, sdo, filters, receives_all: false, outgoing, pending, foreign_nmt, seen }
     }
 
     /// Sets the host's interface to another bit rate in bit/s. Transfers in progress end, and waiting frames are lost.
@@ -154,14 +158,19 @@ impl<'bus> Master<'bus> {
         Ok(())
     }
 
-    /// Receives only the SDO channels and the heartbeats of these nodes. On a busy bus, other frames cost time and may
+    /// The last NMT command of another master, and its node (`None`: all nodes).
+    pub fn foreign_nmt(&self) -> Option<(NmtCommand, Option<NodeId>)> {
+        self.foreign_nmt
+    }
+
+    /// Receives only NMT commands, and the SDO channels and the heartbeats of these nodes. On a busy bus, other frames cost time and may
     /// fill the receive buffer.
     ///
     /// # Errors
     /// The bus rejects the filters.
     pub fn listen_to(&mut self, nodes: &[NodeId]) -> Result<(), Error> {
         let ids = |&node| [CanId::sdo_response(node), CanId::sdo_request(node), CanId::heartbeat(node)];
-        self.listen(&Filters::Only(nodes.iter().flat_map(ids).collect()))
+        self.listen(&Filters::Only(nodes.iter().flat_map(ids).chain([CanId::NMT]).collect()))
     }
 
     /// Queues a frame for sending, after all waiting frames.
@@ -349,6 +358,7 @@ impl<'bus> Master<'bus> {
                     self.sdo.on_time(at, &self.timing, &mut self.outgoing);
                     if !self.sdo.on_frame(&received, &self.timing, &mut self.outgoing) {
                         self.sdo.on_other_frame(&received.frame);
+                        self.foreign_nmt = NmtCommand::parse(&received.frame).or(self.foreign_nmt);
                         return Ok(Happening::Frame(received));
                     }
                 }

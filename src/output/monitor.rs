@@ -163,7 +163,8 @@ fn words(entry: &Entry) -> String {
     }
 }
 
-fn command_text(command: NmtCommand) -> &'static str {
+/// The command in words.
+pub(super) fn command_text(command: NmtCommand) -> &'static str {
     match command {
         NmtCommand::Start => "start",
         NmtCommand::Stop => "stop",

@@ -58,7 +58,7 @@ pub struct LogOptions {
     pub duration: Option<Duration>,
     /// Ends after this many values.
     pub count: Option<u64>,
-    /// Whether nodes may be started.
+    /// Whether nodes may be started. If another NMT master is seen, they are started only with `start_all`.
     pub nmt: bool,
     /// Whether devices that are not sensors (profiles 401, 402 and others) are started too.
     pub start_all: bool,
@@ -269,8 +269,7 @@ pub fn log(
             observer.event(&LogEvent::Share(period, share), master.bus().now());
         }
     }
-    let started = recording.states.start(master, &recording.nodes, options, &mut restarted);
-    let result = started.and_then(|()| {
+    let result = start_nodes(&mut recording, master, &mut restarted, observer).and_then(|()| {
         master.set_tolerates_outages(true);
         recording.restarted_before_start(&restarted, master, observer);
         recording.run(master, observer)
@@ -309,6 +308,19 @@ fn survey(
         None => {}
     }
     Ok((nodes, failed))
+}
+
+/// Starts the nodes. Adds nodes that restart during this time to `restarted`.
+fn start_nodes(
+    recording: &mut Recording<'_>,
+    master: &mut Master<'_>,
+    restarted: &mut BTreeSet<NodeId>,
+    observer: &mut dyn Observer,
+) -> Result<(), Error> {
+    if let Some(remark) = recording.states.start(master, &recording.nodes, recording.options, restarted)? {
+        recording.remark(remark, master.bus().now(), observer);
+    }
+    Ok(())
 }
 
 /// If the answers of a node arrive twice, compares its mapped values. Two devices of one type may differ only in these

@@ -1,4 +1,4 @@
-//! Another node sends SYNC already. A second SYNC producer would double every synchronous TPDO.
+//! Another node sends SYNC or NMT commands already. A second SYNC producer would double every synchronous TPDO.
 
 use super::Kept;
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
@@ -6,9 +6,10 @@ use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::master::{Master, Timing};
+use cangauge::output::events::remark_text;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, State};
-use cangauge::tasks::log::{LogOptions, Mode, log};
+use cangauge::tasks::log::{LogEvent, LogOptions, Mode, log};
 use cangauge::tasks::pdo::{WatchEvent, watch};
 use cangauge::tasks::{Failure, Kind};
 use std::collections::BTreeMap;
@@ -18,9 +19,10 @@ use std::time::Duration;
 
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// A controller that sends SYNC.
+/// A controller that sends a frame, SYNC for example.
 struct Controller {
     next: Mono,
+    frame: &'static str,
 }
 
 impl Station for Controller {
@@ -29,7 +31,7 @@ impl Station for Controller {
     fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
 
     fn wake(&mut self, now: Mono, out: &mut Outbox) {
-        out.send("080#".parse().expect("a frame"));
+        out.send(self.frame.parse().expect("a frame"));
         self.next = now + PERIOD;
     }
 
@@ -41,9 +43,13 @@ impl Station for Controller {
 }
 
 fn record(mode: Mode) -> (MemoryBus, Kept, Result<u64, Failure>) {
+    record_beside(Controller { next: Mono::START + PERIOD, frame: "080#" }, mode, true)
+}
+
+fn record_beside(controller: Controller, mode: Mode, start_all: bool) -> (MemoryBus, Kept, Result<u64, Failure>) {
     let text = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
     let mut bus = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("a bus");
-    bus.attach(Controller { next: Mono::START + PERIOD });
+    bus.attach(controller);
     let plan = LogOptions {
         nodes: vec![NodeId::new(5).expect("a node-ID")],
         wanted: Vec::new(),
@@ -51,7 +57,7 @@ fn record(mode: Mode) -> (MemoryBus, Kept, Result<u64, Failure>) {
         duration: Some(Duration::from_secs(1)),
         count: None,
         nmt: true,
-        start_all: true,
+        start_all,
         max_gap: None,
         overrides: BTreeMap::new(),
     };
@@ -110,7 +116,7 @@ fn watched(second: Option<f64>) -> (Vec<String>, Vec<Kind>) {
     if second.is_none() {
         bus.attach(Bridge::default());
     }
-    bus.attach(Controller { next: Mono::START + PERIOD });
+    bus.attach(Controller { next: Mono::START + PERIOD, frame: "080#" });
     let mut events = Vec::new();
     let mut on_event = |event: &WatchEvent<'_>| {
         events.push(match event {
@@ -139,4 +145,27 @@ fn sync_of_another_producer_is_recorded() {
     let (_, kept, outcome) = record(Mode::AsSent);
     assert_eq!(outcome.unwrap() / 20, 1, "one every 50 ms for a second");
     assert!((19..=21).contains(&kept.rows.len()), "{}", kept.rows.len());
+}
+
+#[test]
+fn nodes_are_not_started_beside_another_nmt_master() {
+    let beside = |frame, mode, start_all| {
+        let (bus, kept, outcome) = record_beside(Controller { next: Mono::START, frame }, mode, start_all);
+        let state = bus.stations::<Device>().next().and_then(Device::state);
+        let remark = |event: &LogEvent| match event {
+            LogEvent::Remark(remark) => Some(remark_text(remark)),
+            _ => None,
+        };
+        (kept.notes.iter().filter_map(remark).collect::<Vec<_>>(), state, outcome.is_ok_and(|rows| rows > 0))
+    };
+    let sync = Mode::Sync(Duration::from_millis(10));
+    for (frame, sent, mode) in [
+        ("000#0109", "\"start\" to node 9", sync),
+        ("000#8000", "\"enter pre-operational\" to all nodes", Mode::AsSent),
+    ] {
+        let note = format!("not started, because another NMT master sent {sent}: node 5; start all nodes: log --start");
+        assert_eq!(beside(frame, mode, false), (vec![note], Some(State::PreOperational), false), "{frame}");
+    }
+    assert_eq!(beside("000#0109", sync, true).2, true, "--start");
+    assert_eq!(beside("000#01", sync, false), (Vec::new(), Some(State::Operational), true), "not a command");
 }

@@ -9,6 +9,7 @@ use crate::canopen::pdo::TpdoNumber;
 use crate::measure::expression::bind::BareLimit;
 use crate::output::diagnosis;
 use crate::output::failure::ErrorMessage;
+use crate::output::monitor::command_text;
 use crate::tasks::Failure;
 use crate::tasks::log::{Change, LogEvent, Remark, TpdoChange};
 use std::time::Duration;
@@ -164,16 +165,16 @@ pub fn remark_text(remark: &Remark) -> String {
             format!("node {node} changed while frames were lost: its rows of the {before} before may be wrong")
         }
         Remark::NotReadAgain(node) => format!("node {node} could not be read again: its later frames were ignored"),
-        Remark::LeftOperational(nodes) => match nodes.as_slice() {
-            [node] => format!("node {node} was started; its previous state is unknown, so it stays operational"),
-            nodes => format!(
-                "nodes {} were started; their previous states are unknown, so they stay operational",
-                listed(nodes)
-            ),
-        },
+        Remark::LeftOperational(nodes) => left_operational(nodes),
         Remark::NotStarted(nodes) => {
             format!("not started, because only sensors are: node {}; start all nodes: log --start", listed(nodes))
         }
+        Remark::OtherNmtMaster(nodes, command, target) => format!(
+            "not started, because another NMT master sent \"{}\" to {}: node {}; start all nodes: log --start",
+            command_text(*command),
+            target.map_or_else(|| "all nodes".to_owned(), |node| format!("node {node}")),
+            listed(nodes)
+        ),
         Remark::NotOperational(node, silence) => {
             format!("node {node} left operational: {}", diagnosis::reason(silence))
         }
@@ -195,6 +196,15 @@ pub fn remark_text(remark: &Remark) -> String {
         }
         Remark::NoMeasurements(node, Some(signal), silence) => {
             format!("node {node}: no measurements of {signal}: {}", diagnosis::reason(silence))
+        }
+    }
+}
+
+fn left_operational(nodes: &[NodeId]) -> String {
+    match nodes {
+        [node] => format!("node {node} was started; its previous state is unknown, so it stays operational"),
+        nodes => {
+            format!("nodes {} were started; their previous states are unknown, so they stay operational", listed(nodes))
         }
     }
 }

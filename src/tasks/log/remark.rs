@@ -2,6 +2,7 @@
 
 use crate::bus::ReceiveBuffer;
 use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::NmtCommand;
 use crate::canopen::pdo::TpdoNumber;
 use crate::master::SdoError;
 use crate::measure::expression::bind::BareLimit;
@@ -39,6 +40,8 @@ pub enum Remark {
     LeftOperational(Vec<NodeId>),
     /// These nodes are not sensors, and were not started.
     NotStarted(Vec<NodeId>),
+    /// These nodes were not started, because another NMT master sent this command, to this node (`None`: all nodes).
+    OtherNmtMaster(Vec<NodeId>, NmtCommand, Option<NodeId>),
     /// The node was operational, but its last heartbeat shows another state.
     NotOperational(NodeId, Box<Silence>),
     /// The previous NMT states of the nodes were not restored.

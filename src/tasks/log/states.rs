@@ -35,30 +35,37 @@ pub(super) struct NmtStates {
 
 impl NmtStates {
     /// Starts the nodes that are not known to be operational. Adds nodes that restart during this time to `restarted`.
+    ///
+    /// If another NMT master was seen, it starts only nodes that the user wants to start explicitly, and returns a remark.
     pub(super) fn start(
         &mut self,
         master: &mut Master<'_>,
         nodes: &[Node],
         options: &LogOptions,
         restarted: &mut BTreeSet<NodeId>,
-    ) -> Result<(), Error> {
+    ) -> Result<Option<Remark>, Error> {
         if !options.nmt || matches!(options.mode, Mode::Poll(_) | Mode::Passive) {
-            return Ok(());
+            return Ok(None);
         }
         let known = heartbeats(master, nodes, restarted)?;
+        let other_master = master.foreign_nmt().filter(|_| !options.start_all);
+        let mut left = Vec::new();
         for node in nodes {
             let before = known.get(&node.id).copied();
             if before == Some(NmtState::Operational) {
                 continue;
             }
-            if !options.start_all && !is_sensor(node) {
+            if other_master.is_some() {
+                left.push(node.id);
+            } else if !options.start_all && !is_sensor(node) {
                 self.not_started.push(node.id);
             } else {
                 self.started.insert(node.id, before);
                 master.send(NmtCommand::Start.frame(Some(node.id)));
             }
         }
-        Ok(())
+        let other_master = other_master.filter(|_| !left.is_empty());
+        Ok(other_master.map(|(command, target)| Remark::OtherNmtMaster(left, command, target)))
     }
 
     /// Starts a node again if this recording had started it.

@@ -61,7 +61,7 @@ impl Recording<'_> {
     }
 
     /// Reports an observation now and in the summary.
-    fn remark(&mut self, remark: Remark, at: Stamp, observer: &mut dyn Observer) {
+    pub(in crate::tasks::log) fn remark(&mut self, remark: Remark, at: Stamp, observer: &mut dyn Observer) {
         observer.event(&LogEvent::Remark(remark.clone()), at);
         self.remarks.push(remark);
     }
