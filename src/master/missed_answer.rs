@@ -32,7 +32,7 @@ pub struct MissedAnswer {
 pub(super) struct MissedAnswers {
     states: BTreeMap<NodeId, NmtState>,
     answered: BTreeSet<NodeId>,
-    /// When the nodes sent their boot-up messages.
+    /// When the nodes sent their boot-up messages, until their first answer.
     boot_times: BTreeMap<NodeId, Mono>,
     /// The total time of repeats after boot-up messages that got no answer.
     time_without_answer: Duration,
@@ -83,7 +83,7 @@ impl MissedAnswers {
         self.time_without_answer += time;
     }
 
-    /// Whether a node started a short time ago. Some devices do not answer for 2 to 3 s after their boot-up message.
+    /// Whether a node started a short time ago and has not answered since. Some devices do not answer for 2 to 3 s after their boot-up message.
     /// `asked_at` is the time of the first request: further boot-up messages do not extend the time limit.
     pub(super) fn is_starting(&self, node: NodeId, asked_at: Option<Mono>, now: Mono) -> bool {
         let is_recent = |moment: Mono| now.since(moment) < START_TIME;
@@ -99,6 +99,7 @@ impl MissedAnswers {
     /// A node answered.
     pub(super) fn on_answer(&mut self, node: NodeId) {
         self.answered.insert(node);
+        self.boot_times.remove(&node);
         self.end(node);
     }
 

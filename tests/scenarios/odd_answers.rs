@@ -1,5 +1,6 @@
 //! Answers of the wrong length, and more than one answer to a request.
 
+use super::Kept;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
@@ -13,6 +14,7 @@ use cangauge::measure::sample::Doubt;
 use cangauge::node::survey::{identify, survey_each};
 use cangauge::node::{self, Node, Overrides, write};
 use cangauge::sim::{Device, Setup};
+use cangauge::tasks::log::{LogOptions, Mode, log};
 use cangauge::tasks::read::{Readings, read as read_signals};
 use cangauge::tasks::{Failure, Kind};
 use std::time::Duration;
@@ -322,6 +324,27 @@ fn silent_status_object_is_an_unknown_status() {
         assert_eq!(readings_of(kind, &[])[0].1.doubt, None, "{kind}");
     }
     assert_eq!(readings("mh4", &[0x6130]).expect_err("the value does not answer").kind(), Kind::NoAnswer);
+}
+
+#[test]
+fn silent_status_object_does_not_slow_polling_down() {
+    for (kind, silent, signals) in [("mh4", &[0x6150][..], 2), ("dps", &[0x1001], 1)] {
+        let options = LogOptions {
+            nodes: vec![node()],
+            wanted: Vec::new(),
+            mode: Mode::Poll(Duration::from_millis(100)),
+            duration: Some(Duration::from_secs(10)),
+            count: None,
+            nmt: true,
+            start_all: false,
+            max_gap: None,
+            overrides: Overrides::new(),
+        };
+        let mut kept = Kept::default();
+        with_mute(kind, silent, |master| log(master, &options, &mut kept)).expect("the values answer");
+        assert!(kept.rows.len() > 75 * signals, "{kind}: {}", kept.rows.len());
+        assert!(kept.rows.iter().all(|row| !row.contains(",ok,")), "{kind}: {:?}", kept.rows);
+    }
 }
 
 #[test]
