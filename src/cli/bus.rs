@@ -1,6 +1,6 @@
 //! `cangauge bus`.
 
-mod host;
+pub(super) mod host;
 
 use super::args::{BitRate, BusSpec, Duration, InterfaceName};
 use super::exit::IntoFailure;

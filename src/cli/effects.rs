@@ -8,7 +8,7 @@ impl Command {
     pub(super) fn only_reads(&self) -> bool {
         match self {
             Command::Scan(_) | Command::Read(_) | Command::Info(_) | Command::Doctor(_) => true,
-            Command::Objects(_) | Command::Devices(_) | Command::Export(_) => true,
+            Command::Objects(_) | Command::Devices(_) | Command::Export(_) | Command::Health(_) => true,
             Command::Sdo(sdo) => sdo.only_reads(),
             _ => false,
         }
@@ -22,6 +22,7 @@ impl Command {
             Command::Log(log) => log.passive,
             Command::Doctor(doctor) => doctor.passive,
             Command::Monitor(_) => true,
+            Command::Health(health) => health.passive,
             _ => false,
         }
     }

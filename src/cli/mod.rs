@@ -15,6 +15,7 @@ pub mod exit;
 mod export;
 mod file;
 mod filter;
+mod health;
 mod info;
 mod journal;
 mod limits;
@@ -259,6 +260,7 @@ commands! {
     Sim(sim::Sim): "sim";
     Doctor(doctor::Doctor): "doctor";
     Monitor(monitor::Monitor): "monitor";
+    Health(health::HealthCommand): "health";
     Objects(objects::Objects): "objects";
     Export(export::Export): "export";
     Plot(plot::Plot): "plot";

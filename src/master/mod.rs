@@ -27,7 +27,6 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{FitError, Note, Uploaded, fit};
 use crate::canopen::value::{DataType, Value};
 use crate::device::quirk::Quirk;
 use sdo::SdoClient;
@@ -103,6 +102,8 @@ pub struct Master<'bus> {
     filters: Filters,
     /// Whether the bus delivers all frames, independently of the filters.
     receives_all: bool,
+    /// Whether answers to our transfers are returned as frames too.
+    delivers_answers: bool,
     outgoing: Outgoing,
     /// A frame that was received after the deadline. It is handled next.
     pending: Option<Received>,
@@ -116,8 +117,9 @@ impl<'bus> Master<'bus> {
     /// A master on `bus`.
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
         let (sdo, filters, outgoing) = (SdoClient::default(), Filters::All, Outgoing::new());
+        let (receives_all, delivers_answers) = (false, false);
         let (pending, foreign_nmt, seen) = (None, None, Mono::START);
-        Master { bus, timing, sdo, filters, receives_all: false, outgoing, pending, foreign_nmt, seen }
+        Master { bus, timing, sdo, filters, receives_all, delivers_answers, outgoing, pending, foreign_nmt, seen }
     }
 
     /// Sets the host's interface to another bit rate in bit/s. Transfers in progress end, and waiting frames are lost.
@@ -171,6 +173,11 @@ impl<'bus> Master<'bus> {
     pub fn listen_to(&mut self, nodes: &[NodeId]) -> Result<(), Error> {
         let ids = |&node| [CanId::sdo_response(node), CanId::sdo_request(node), CanId::heartbeat(node)];
         self.listen(&Filters::Only(nodes.iter().flat_map(ids).chain([CanId::NMT]).collect()))
+    }
+
+    /// Also returns the answers to our own transfers as [`Happening::Frame`].
+    pub fn deliver_own_answers(&mut self) {
+        self.delivers_answers = true;
     }
 
     /// Queues a frame for sending, after all waiting frames.
@@ -361,6 +368,9 @@ impl<'bus> Master<'bus> {
                         self.foreign_nmt = NmtCommand::parse(&received.frame).or(self.foreign_nmt);
                         return Ok(Happening::Frame(received));
                     }
+                    if self.delivers_answers {
+                        return Ok(Happening::Frame(received));
+                    }
                 }
                 Event::Fault(fault, at) => return Ok(Happening::Fault(fault, at)),
                 Event::Dropped(count) => return Ok(Happening::Dropped(count)),
@@ -473,27 +483,5 @@ impl<'bus> Master<'bus> {
     ) -> Result<Result<Value, SdoError>, Error> {
         let answer = self.transfer_one(Request::read(node, object))?;
         Ok(answer.and_then(|answer| answer.value(node, object, Some(data_type)).map(|(value, _)| value)))
-    }
-}
-
-impl Answer {
-    /// The value read, and a note if the device deviated from the protocol.
-    ///
-    /// # Errors
-    /// The bytes do not fit the type.
-    pub fn value(
-        &self,
-        node: NodeId,
-        object: ObjectId,
-        data_type: Option<DataType>,
-    ) -> Result<(Value, Option<Note>), SdoError> {
-        let empty = Uploaded::complete(Vec::new());
-        let uploaded = self.uploaded.as_ref().unwrap_or(&empty);
-        fit(data_type, uploaded).map(|fitted| (fitted.value, fitted.note)).map_err(|error: FitError| SdoError {
-            node,
-            object,
-            operation: Operation::Read,
-            failure: SdoFailure::Fit(error),
-        })
     }
 }

@@ -9,7 +9,8 @@ use crate::bus::time::format_duration;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, DownloadSize, FitError, LONGEST, Uploaded, Violation};
+use crate::canopen::sdo::{AbortCode, DownloadSize, FitError, LONGEST, Note, Uploaded, Violation, fit};
+use crate::canopen::value::{DataType, Value};
 use std::fmt;
 use std::time::Duration;
 
@@ -275,4 +276,26 @@ fn received(missed: &MissedAnswer) -> String {
     let heard = missed.frame.map(|frame| format!("; heard {frame}")).unwrap_or_default();
     let state = missed.state.map(|state| format!("; its heartbeat shows {state}")).unwrap_or_default();
     format!("{heard}{state}")
+}
+
+impl Answer {
+    /// The value read, and a note if the device deviated from the protocol.
+    ///
+    /// # Errors
+    /// The bytes do not fit the type.
+    pub fn value(
+        &self,
+        node: NodeId,
+        object: ObjectId,
+        data_type: Option<DataType>,
+    ) -> Result<(Value, Option<Note>), SdoError> {
+        let empty = Uploaded::complete(Vec::new());
+        let uploaded = self.uploaded.as_ref().unwrap_or(&empty);
+        fit(data_type, uploaded).map(|fitted| (fitted.value, fitted.note)).map_err(|error: FitError| SdoError {
+            node,
+            object,
+            operation: Operation::Read,
+            failure: SdoFailure::Fit(error),
+        })
+    }
 }

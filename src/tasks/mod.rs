@@ -9,6 +9,7 @@ pub mod diagnosis;
 pub mod doctor;
 pub mod export;
 pub mod failure;
+pub mod health;
 pub mod host;
 pub mod journal;
 pub mod log;

@@ -13,6 +13,7 @@ mod doctor;
 mod examples;
 mod export;
 mod half_dead;
+mod health;
 mod hostile;
 mod info;
 mod log;

@@ -17,7 +17,7 @@ mod linux {
     use crate::tasks::host::{HostAction, HostFailure, not_set};
 
     /// The interfaces of this computer.
-    pub(in super::super) fn list() -> Vec<Interface> {
+    pub(in crate::cli) fn list() -> Vec<Interface> {
         let described = |found: crate::bus::socketcan::Interface| {
             // The interface may have been removed in the meantime.
             let link = link(&found.name).ok();
@@ -73,10 +73,11 @@ mod linux {
 }
 
 #[cfg(all(target_os = "linux", not(without_socketcan)))]
-pub(super) use linux::{down, list, up};
+pub(in crate::cli) use linux::list;
+pub(super) use linux::{down, up};
 
 #[cfg(not(all(target_os = "linux", not(without_socketcan))))]
-pub(super) fn list() -> Vec<Interface> {
+pub(in crate::cli) fn list() -> Vec<Interface> {
     Vec::new()
 }
 
