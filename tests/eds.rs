@@ -557,7 +557,7 @@ fn names_are_unique_and_can_be_typed() {
 }
 
 #[test]
-fn huge_numbers_cost_neither_time_nor_memory() {
+fn huge_numbers_need_no_extra_time_or_memory() {
     let eds = load(
         "29-huge-numbers.eds",
         &[

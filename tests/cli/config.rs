@@ -280,7 +280,7 @@ event-timer = "100ms"
 "#;
 
 #[test]
-fn apply_writes_what_differs_and_reads_it_back() {
+fn apply_writes_differences_and_reads_them_back() {
     let bench = Bench::of(ALL);
     std::fs::write(bench.path("f.toml"), FILE).expect("a file");
     let done = bench.run("config apply 1 f.toml --store --reset --format json").exit(0);
@@ -330,7 +330,7 @@ fn a_dry_run_lists_the_writes() {
 }
 
 #[test]
-fn a_diff_names_what_differs_with_units() {
+fn diff_lists_differences_with_units() {
     let bench = Bench::of(ALL);
     std::fs::write(bench.path("f.toml"), FILE).expect("a file");
     let done = bench.run("config diff 1 f.toml").exit(1);
@@ -448,7 +448,7 @@ fn the_record_can_be_a_page_and_the_schema_is_json() {
 }
 
 #[test]
-fn a_dcf_sets_a_device_and_its_own_values_change_nothing() {
+fn dcf_sets_a_device_and_equal_values_are_not_written() {
     for (device, node) in [("mh4", 1), ("dps", 127), ("d20", 2), ("mc1609", 3), ("jumo", 4)] {
         let bench = Bench::of(&format!("{device}@{node},{device}@9"));
         let dcf = bench.run(&format!("config dump {node} --dcf")).exit(0).stdout;
@@ -473,7 +473,7 @@ fn a_dcf_sets_a_device_and_its_own_values_change_nothing() {
 }
 
 #[test]
-fn what_a_device_lacks_of_a_dcf_is_reported() {
+fn objects_of_a_dcf_that_the_device_lacks_are_reported() {
     let bench = Bench::of("mh4@1,dps@127");
     let mut dcf = bench.run("config dump 1 --dcf").exit(0).stdout;
     dcf += "[2FF0]\nParameterName=Gain\nObjectType=7\nDataType=7\nAccessType=rw\nParameterValue=5\n\

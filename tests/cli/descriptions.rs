@@ -125,7 +125,7 @@ fn a_description_and_an_eds_are_used_together() {
 }
 
 #[test]
-fn eds_warnings_are_one_line_and_those_of_the_object() {
+fn eds_warnings_are_one_line_and_concern_the_object() {
     let text = eds(0x47, 1, &NAMES).replace("4=0x2202\n", "").replace("3=0x2201\n", "");
     let bench = bench_with("mh4@1", &[("x.eds", text)]);
     let done = bench.run("--eds x.eds sdo read 1 0x1018:1").exit(0);
@@ -296,7 +296,7 @@ fn mistakes_in_a_description_are_shown_with_their_places() {
 }
 
 #[test]
-fn description_of_another_vendor_is_used_only_if_its_types_are_those_of_cia_404() {
+fn description_of_another_vendor_is_used_only_with_types_of_cia_404() {
     let devices = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/mh4.toml");
     let text = fs::read_to_string(devices).expect("the description");
     let other = text.replacen("name = \"mh4\"", "name = \"other\"", 1).replace("default = 71\n", "default = 0x7777\n");

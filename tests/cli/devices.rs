@@ -101,7 +101,7 @@ fn a_new_description_of_a_device_passes_the_check_and_gives_the_same_values() {
 }
 
 #[test]
-fn a_new_description_leaves_open_what_no_source_states() {
+fn new_description_has_no_guessed_fields() {
     let bench = Bench::described("[[device]]\nkind = \"own.toml\"\nnode = 5\n");
     let text = "name = \"own\"\ntitle = \"T\"\nvendor = \"V\"\n\
                 [[object]]\nat = \"0x1000\"\nname = \"device-type\"\ntype = \"u32\"\naccess = \"ro\"\ndefault = 0\n\

@@ -20,7 +20,7 @@ fn finding_is_followed_by_the_command_to_type() {
 }
 
 #[test]
-fn nothing_wrong_is_success() {
+fn bus_without_faults_is_success() {
     let done = Bench::described(SENDING).run("doctor 5").exit(0);
     assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", "1 node: no problem found\n"));
 }

@@ -105,7 +105,7 @@ fn count<'a>(rows: impl IntoIterator<Item = &'a Row>) -> BTreeMap<(&'a str, &'a 
 }
 
 #[test]
-fn rows_match_what_four_devices_sent() {
+fn rows_match_the_values_of_four_devices() {
     let mut first_values = BTreeSet::new();
     for seed in [0, 1, 7, 12345] {
         let bench = four_devices(seed);

@@ -16,7 +16,7 @@ fn names(numbers: std::ops::RangeInclusive<u32>) -> Vec<String> {
 }
 
 #[test]
-fn rotation_by_time_neither_loses_nor_repeats_rows() {
+fn rotation_by_time_keeps_each_row_once() {
     let whole = Bench::of("mh4@1").run("log 1 --sync 10ms --duration 5s").exit(0).stdout;
     let bench = Bench::of("mh4@1");
     bench.run("log 1 --sync 10ms --duration 5s -o run.csv --rotate 2s").prints("");
@@ -33,7 +33,7 @@ fn rotation_by_time_neither_loses_nor_repeats_rows() {
 }
 
 #[test]
-fn rotation_by_size_neither_loses_nor_repeats_rows() {
+fn rotation_by_size_keeps_each_row_once() {
     for line in ["--sync 10ms", "--sync 10ms --format json", "--sync 10ms --layout wide"] {
         let whole = Bench::of("mh4@1").run(&format!("log 1 {line} --duration 2s")).exit(0).stdout;
         let bench = Bench::of("mh4@1");

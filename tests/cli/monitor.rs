@@ -28,7 +28,7 @@ fn lines(done: &Done) -> Vec<&str> {
 }
 
 #[test]
-fn values_are_those_that_the_commands_report() {
+fn values_match_the_reports_of_other_commands() {
     let bench = Bench::of(ALL);
     for (command, node) in [
         ("sdo read 1 0x1000 0x1008 0x1017 0x1018:4 0x1a00:1 0x6131:1 0x6132:1 0x6150:1 0x2010:1", 1),

@@ -16,7 +16,7 @@ fn table_lists_every_node() {
 }
 
 #[test]
-fn nodes_without_answer_are_asked_once_more_in_parallel() {
+fn silent_nodes_are_asked_again_in_parallel() {
     let done = Bench::of("mh4@5").run("scan").exit(0);
     for node in 1..=127u8 {
         let asked: Vec<u64> = (done.frames.iter().zip(&done.times))

@@ -44,7 +44,7 @@ use cangauge::tasks::pdo::Settings;
 use cangauge::tasks::store::Group;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A violations rule, and how it was violations.
+/// A violated rule, and the details of the violation.
 pub(crate) type Violation = (&'static str, String);
 
 pub(crate) fn judge(spec: &Spec, run: &mut Run) -> Vec<Violation> {

@@ -1,5 +1,5 @@
-//! Generated scenarios: a seed gives devices, faults, a command and an interruption. Then the test checks what must
-//! always hold. The same seed always gives the same scenario.
+//! Generated scenarios: a seed gives devices, faults, a command and an interruption. Then the test checks the rules that
+//! must always hold. The same seed always gives the same scenario.
 //!
 //! ```text
 //! cargo test --test engine                                        some hundred fixed seeds
@@ -50,7 +50,7 @@ fn print_line(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
 
-/// Runs a scenario. Returns the violations rules and the transcript.
+/// Runs a scenario. Returns the violated rules and the transcript.
 fn run_and_judge(spec: &Spec) -> (Vec<Violation>, String) {
     let tried = catch_unwind(AssertUnwindSafe(|| {
         let mut run = run::run(spec);

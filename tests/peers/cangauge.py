@@ -2,10 +2,9 @@
 
     cangauge.py BINARY IFACE [A:B] [NAME...]
 
-Python-canopen devices (device.py) and the program's own simulated ones are read, recorded and
-disturbed; python-canopen (master.py) reads the simulated ones. A:B are two ends of one wire (vxcan),
-which are taken down and slowed down; without them the checks that need them are skipped. Names pick
-single checks. tests/socketcan/vcan provides the interfaces:
+Reads, records and disturbs python-canopen devices (device.py) and simulated devices. python-canopen (master.py) reads
+the simulated devices. A:B are two ends of one wire (vxcan), which are taken down and slowed down. Without A:B the checks
+that need them are skipped. NAME selects single checks. tests/socketcan/vcan provides the interfaces:
 
     tests/socketcan/vcan -i vcan0,vx0:vx1 target/peers/bin/python tests/peers/cangauge.py target/debug/cangauge vcan0 vx0:vx1
 """

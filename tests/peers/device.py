@@ -1,17 +1,19 @@
-"""Measuring devices on a CAN bus, made with python-canopen: the foreign devices of cangauge's tests.
+"""Measuring devices on a CAN bus, made with python-canopen, for the tests of cangauge.
 
     device.py [--record FILE] [--period MS] [--sync N] [--heartbeat MS] [--quiet] IFACE NODE:KIND...
 
-KIND is real32 (pressure in bar as REAL32 with a status byte), overload (the same, out of its range
-now and then) or integer (pressure in psi as INTEGER32 with three digits). Each sends TPDO 1 while
-OPERATIONAL, every --period ms (50), or with --sync N on every N-th SYNC. Prints "ready" once all
-have booted, and ends on SIGTERM.
+KIND is one of:
 
-The n-th value that a node sends is known beforehand: n counts from 0 since the start of this
-program and wraps at 4096; real32 sends n * 0.25 - 100 bar, integer sends n * 7 - 5000 (thousandths
-of psi). Of every eight values of overload the 5th is NaN and too high by its status, the 6th NaN and
-too low, and the 7th a number with the status "invalid". --record writes "NODE,N,VALUE,STATUS" for
-every TPDO, value and status as they stand in the PDO, just before it is sent.
+    real32      pressure in bar as REAL32 with a status byte: n * 0.25 - 100 bar
+    overload    as real32, with overloads
+    integer     pressure in psi as INTEGER32 with three decimal digits: n * 7 - 5000 (thousandths of psi)
+
+In OPERATIONAL, each device sends TPDO1 every --period ms (50). With --sync N it sends TPDO1 at every N-th SYNC. The
+program prints "ready" when all devices have booted, and ends on SIGTERM.
+
+n counts the values of a node from 0 since the start of this program, and wraps at 4096. Of eight values of "overload",
+the 5th is NaN with the status "positive overload" and the 6th is NaN with "negative overload". The 7th is a number with
+the status "invalid". --record writes "NODE,N,VALUE,STATUS" before each TPDO, with the value and status of the PDO.
 
 2000h and 2001h are manufacturer-specific objects: UNSIGNED16 and a text.
 """
@@ -202,7 +204,7 @@ def main():
 
     if arguments.quiet:
         logging.disable()
-    # The signals are waited for below. Threads started from here on inherit the blocking.
+    # The main thread waits for the signals below. Threads started from here on inherit the blocking.
     ends = {signal.SIGTERM, signal.SIGINT}
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
     log = open(arguments.record, "w", encoding="ascii") if arguments.record else None

@@ -1,4 +1,4 @@
-"""Object dictionaries for python-canopen, written in code: no EDS file is shared with cangauge."""
+"""Object dictionaries for python-canopen, written in code. They share no EDS file with cangauge."""
 
 from canopen import objectdictionary as od
 

@@ -26,7 +26,7 @@ def harms(identifier, data, nodes):
     if identifier & 0x780 == 0x600 and identifier & 0x7F in nodes:
         # The request of a download.
         return first >> 5 in (1, 6)
-    # LSS.
+    # LSS requests.
     return identifier == 0x7E5 and 0 < first < 0x60
 
 

@@ -1,7 +1,6 @@
-"""Common parts of the checks of cangauge with foreign peers: the program, the devices, the bus.
+"""Common parts of the checks with python-canopen: the program, the devices, the bus.
 
-Nothing here or in the checks waits for a length of time that a slow machine could outlast: what has to
-come is waited for until it comes, within GIVE_UP.
+The checks do not depend on the speed of the machine: they wait for each expected event, for GIVE_UP at most.
 """
 
 import contextlib

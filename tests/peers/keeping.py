@@ -130,7 +130,7 @@ class Transmitter:
 
 
 def python_device_is_zeroed_and_stores(cangauge, directory):
-    """A foreign device understands the writes of cangauge, and gets each once."""
+    """A python-canopen device understands the writes of cangauge, and receives each signature once."""
     with network(cangauge.interface) as bus:
         device = Transmitter(bus)
         done = cangauge.run(*PATIENT, "autozero", 5, "--samples", 2, "--format", "json")

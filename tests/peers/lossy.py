@@ -1,11 +1,11 @@
-"""The program behind a wire that loses, doubles, delays and flips, with python-canopen and durand as devices.
+"""The program on a wire that loses, doubles and delays frames and flips bits. The devices use python-canopen and durand.
 
     lossy.py [--operations N] [--seconds N] [--percent P] [--only-loss] [--seed N] [--verbose] BINARY HERE THERE
 
-Each device has one worker, which runs one random command after the other. The devices are in this process, so their
-own objects and states are the truth. Exit code 0 with another state, or a value that is not the device's, is false,
-unless a flipped data byte without CRC explains it. A command that failed is run again on a calm wire: it must succeed,
-and nothing may be left behind.
+Each device has one worker, which runs one random command after the other. The devices are in this process, so the
+result is compared with their own objects and states. Exit code 0 is an error if the device has a different value or
+state, unless a data byte without CRC was flipped. A command that failed is run again without faults: it must
+succeed and leave no journal.
 
     tests/socketcan/vcan -t 900 -i vcan0,vcan1 target/peers/bin/python tests/peers/lossy.py --seconds 60 target/debug/cangauge vcan0 vcan1
 """
@@ -96,7 +96,7 @@ class Worker(threading.Thread):
             try:
                 self.reset()
                 self.carry_out(self.rng.choice(self.operations())())
-            # A failure of the test itself ends it.
+            # A failure of the test itself ends the test.
             except Exception as error:
                 self.test.complain(self.node, [], f"{type(error).__name__}: {error}", [])
                 raise
@@ -333,7 +333,7 @@ class Blocks(Worker):
         self.store = Store(Cangauge(self.test.binary, self.test.there), self.test.folder, "durand").__enter__()
 
     def restarts(self):
-        """After a changed request durand may stay in a block upload that nobody asked for."""
+        """After a changed request durand may stay in a block upload that was not requested."""
         self.store.kill()
         self.start_store()
         return True

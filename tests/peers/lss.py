@@ -2,8 +2,8 @@
 
     lss.py BINARY IFACE [NAME...]
 
-Each service of python-canopen, with devices that have a node-ID, with devices without one, and
-with requests that a device rejects or does not support.
+Uses each LSS service of python-canopen, with devices with and without a node-ID. Some requests are rejected or not
+supported.
 
     tests/socketcan/vcan target/peers/bin/python tests/peers/lss.py target/debug/cangauge vcan0
 """

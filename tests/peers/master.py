@@ -2,11 +2,12 @@
 
     master.py [--sync] [--values N] [--type INDEX=TYPE]... IFACE NODE...
 
-For every node one line: device type, identity, name (segmented), unit, digits and value of each
-channel, the NMT states shown by the heartbeat that it switches on, and N values of each valid TPDO
-(3) that comes by SYNC, sent here with --sync, or by itself. --type 6130=INTEGER32 is for devices
-that give an object of CiA 404 a different type. It restores what it changed. Exit status 1 and
-a line on standard error if an answer is missing or wrong.
+Prints one line for each node: device type, identity, name (segmented), the NMT states that its heartbeat shows, and
+unit, decimal digits and value of each channel. It also contains N values (3) of each valid TPDO.
+
+--sync sends SYNC, for devices with synchronous TPDOs. --type 6130=INTEGER32 is for a device on which an object of
+CiA 404 has a different type. The program switches the heartbeat on and restores all changed objects. If an answer is
+missing or wrong, it prints a line on standard error, and the exit status is 1.
 """
 
 import argparse
@@ -104,7 +105,7 @@ def ask(network, node, sync, count):
     sdo[0x1017].raw = HEARTBEAT_MS
     try:
         if sdo[0x1017].raw != HEARTBEAT_MS:
-            raise RuntimeError(f"node {node.id}: 1017h does not hold what was written")
+            raise RuntimeError(f"node {node.id}: 1017h does not have the written value")
         before = node.nmt.wait_for_heartbeat(TIMEOUT)
         node.nmt.state = "OPERATIONAL"
         states = [before, expect(node, "OPERATIONAL")]

@@ -2,9 +2,8 @@
 
     rival.py IFACE NODE...
 
-Expedited and segmented objects, one after the other. Two masters on one SDO channel disturb each other:
-what fails here is counted and repeated. Prints "reading" when the first answer has come, and at its end
-how many reads succeeded.
+It reads expedited and segmented objects in turn. Two masters on one SDO channel disturb each other, so failed reads
+are counted and repeated. Prints "reading" after the first answer, and the number of successful reads at the end.
 """
 
 import signal

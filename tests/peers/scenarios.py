@@ -1,10 +1,10 @@
 """Runs random scenarios with the real program: a seed selects devices, faults, a command, an interruption.
 
-    scenarios.py [--seed N] [--count N] [--seconds N] [--verbose] [--command NAME] [--forge NAME] BINARY HERE THERE
+    scenarios.py [--seed N] [--count N] [--seconds N] [--verbose] [--command NAME] [--program-error NAME] BINARY HERE THERE
 
-The simulated devices are on THERE, the program is on HERE, and between them a relay makes what goes wrong
-(scenario/relay.py). Judged from the devices' own side, once the command has ended and nothing is wrong any
-more (scenario/judge.py). Without --seed a fresh one is taken and printed, and those behind it follow.
+The simulated devices are on THERE and the program is on HERE. A relay between them makes the faults
+(scenario/relay.py). When the command and all faults have ended, the devices are read from their own side and judged
+(scenario/judge.py). The first seed is --seed, or else random and printed. The next scenarios use the seeds after it.
 
     tests/socketcan/vcan -t 900 -i vcan0,vcan1 target/peers/bin/python tests/peers/scenarios.py target/debug/cangauge vcan0 vcan1
 """
@@ -22,23 +22,23 @@ import time
 import traceback
 
 from scenario import judge
-from scenario.forge import FORGERIES
 from scenario.foreign import Foreign
 from scenario.make import Scenario
 from scenario.probe import Probe
 from scenario.recording import rows_of
 from scenario.relay import Relay, stop
+from scenario.wrong_program import PROGRAM_ERRORS
 
-# Longer than any command takes while it gets some answers.
+# No command takes longer if it gets some answers.
 DEADLINE = 90
 SHOWN_FRAMES = 60
 
 
-class Look:
+class DeviceState:
     """The values and NMT states of the devices at one moment."""
 
-    def __init__(self, held, states):
-        self.held, self.states = held, states
+    def __init__(self, objects, states):
+        self.objects, self.states = objects, states
 
 
 class Run:
@@ -49,12 +49,12 @@ class Run:
     rows, is_whole = [], True
 
 
-class Bed:
+class TestBed:
     """The program, the devices and the relay between them."""
 
-    def __init__(self, binary, here, there, forgery=None):
+    def __init__(self, binary, here, there, program_error=None):
         self.binary, self.here, self.there = os.path.abspath(binary), here, there
-        self.relay, self.probe = Relay(here, there, forgery), Probe(there)
+        self.relay, self.probe = Relay(here, there, program_error), Probe(there)
 
     def simulator(self, scenario, directory):
         """Starts the devices in a separate process."""
@@ -67,10 +67,10 @@ class Bed:
         came = self.probe.boot_ups(expected)
         if len(came) != expected:
             process.kill()
-            raise RuntimeError(f"boot-ups of {came} only: {open(err.name).read()}")
+            raise RuntimeError(f"boot-ups only of {came}: {open(err.name).read()}")
         return process
 
-    def look(self, scenario):
+    def read_devices(self, scenario):
         """Reads the states first. A stopped node is then started, so that it answers SDO."""
         devices = list(scenario.devices)
         if scenario.command == "set-id":
@@ -81,15 +81,15 @@ class Bed:
         for node, state in states.items():
             if state == "stopped":
                 self.probe.nmt(0x80, node)
-        return Look(self.probe.snapshot(devices), states)
+        return DeviceState(self.probe.snapshot(devices), states)
 
-    def happenings(self, scenario, simulator, program):
+    def events(self, scenario, simulator, program):
         """The events during the run, for the relay."""
         relay = self.relay
         acts = {"down": lambda _: relay.link("down"), "up": lambda _: relay.link("up"), "stopped": lambda _: stop(simulator, True),
                 "continued": lambda _: stop(simulator, False), "power": relay.device_resets, "cut": lambda _: relay.cut(True),
                 "joined": lambda _: relay.cut(False)}
-        planned = [(at, lambda what=what, of=of: acts[what](of), f"{what} {of or ''}".strip()) for at, what, of in scenario.happenings]
+        planned = [(at, lambda what=what, of=of: acts[what](of), f"{what} {of or ''}".strip()) for at, what, of in scenario.events]
         planned += [(at, lambda frame=frame: relay.rival_sends(*frame), "rival") for at, _, frame in scenario.rival]
         if scenario.signal:
             name, at = scenario.signal
@@ -104,8 +104,8 @@ class Bed:
         if scenario.wanted.get("file"):
             line += ["--output", paths[2]]
         clean = name != "run"
-        self.relay.begin([] if clean else scenario.faults, {} if clean else scenario.loss, scenario.seed,
-                         [] if clean else self.happenings(scenario, simulator, lambda: process[0]))
+        self.relay.start_record([] if clean else scenario.faults, {} if clean else scenario.loss, scenario.seed,
+                                [] if clean else self.events(scenario, simulator, lambda: process[0]))
         self.relay.open()
         with open(paths[0], "w") as out, open(paths[1], "w") as err:
             process.append(subprocess.Popen(line, stdout=out, stderr=err, stdin=subprocess.DEVNULL))
@@ -113,7 +113,7 @@ class Bed:
             try:
                 process[0].wait(0.25)
             except subprocess.TimeoutExpired:
-                self.relay.begin_now()
+                self.relay.start_clock()
                 try:
                     process[0].wait(DEADLINE)
                 except subprocess.TimeoutExpired:
@@ -150,25 +150,25 @@ class Bed:
         simulator = self.simulator(scenario, directory)
         problems = []
         try:
-            fresh = scenario.fresh = self.look(scenario)
+            fresh = scenario.fresh = self.read_devices(scenario)
             for device in scenario.devices:
                 if device["unsaved"] and device["node"]:
                     self.probe.write(device["node"], (0x1017, 0), device["unsaved"], 2)
-            before = scenario.before = Look(self.probe.snapshot(scenario.devices), fresh.states)
+            before = scenario.before = DeviceState(self.probe.snapshot(scenario.devices), fresh.states)
             run = self.execute(scenario, simulator, directory, "run")
             run.fresh, run.before = fresh, before
             run.configuring = self.probe.configuring()
             self.probe.leave_configuration()
-            run.after = self.look(scenario)
+            run.after = self.read_devices(scenario)
             with Foreign(self.there) as foreign:
-                problems += named("", judge.claim(scenario, run, foreign), foreign)
+                problems += with_failed_read("", judge.claim(scenario, run, foreign), foreign)
             if run.exit == -9:
                 problems += self.again(scenario, simulator, directory, run)
             self.probe.reset(sum(bool(device["node"]) for device in scenario.devices))
-            run.reset = Look(self.probe.snapshot(scenario.devices), {})
+            run.reset = DeviceState(self.probe.snapshot(scenario.devices), {})
             if run.exit == 0:
                 with Foreign(self.there) as foreign:
-                    problems += named("after a reset: ", judge.claims.after_reset(scenario, run, foreign), foreign)
+                    problems += with_failed_read("after a reset: ", judge.claims.after_reset(scenario, run, foreign), foreign)
             problems += judge.judge(scenario, run)
         finally:
             simulator.send_signal(signal.SIGINT)
@@ -180,16 +180,16 @@ class Bed:
     def again(self, scenario, simulator, directory, killed):
         """Runs the same command again without faults: it must succeed, or reject with a reason."""
         run = self.execute(scenario, simulator, directory, "again")
-        run.before, run.after = killed.after, self.look(scenario)
+        run.before, run.after = killed.after, self.read_devices(scenario)
         with Foreign(self.there) as foreign:
-            problems = named("", judge.claim(scenario, run, foreign), foreign)
+            problems = with_failed_read("", judge.claim(scenario, run, foreign), foreign)
         if run.exit not in judge.EXITS - {5, 130} or "panicked" in run.err:
             problems.append(f"exit code {run.exit}: {run.err}")
-        return [f"the same again: {complaint}" for complaint in problems]
+        return [f"the same command again: {complaint}" for complaint in problems]
 
 
-def named(when, complaints, foreign):
-    """The complaints, and the objects that the judge could not read."""
+def with_failed_read(when, complaints, foreign):
+    """The complaints, each with the reason of the last failed read of the judge."""
     trouble = f" ({foreign.trouble})" if foreign.trouble else ""
     return [f"{when}{complaint}{trouble}" for complaint in complaints]
 
@@ -200,8 +200,8 @@ def main():
     parser.add_argument("--count", type=int)
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--verbose", action="store_true")
-    parser.add_argument("--command", help="leave out the seeds of others")
-    parser.add_argument("--forge", choices=FORGERIES)
+    parser.add_argument("--command", help="run only the seeds of this command")
+    parser.add_argument("--program-error", choices=PROGRAM_ERRORS)
     parser.add_argument("binary")
     parser.add_argument("here")
     parser.add_argument("there")
@@ -211,8 +211,8 @@ def main():
     seed = options.seed if options.seed is not None else random.SystemRandom().randrange(1 << 32)
     count = options.count or (None if options.seconds else 1 if options.seed is not None else 100)
     print(f"from seed {seed}", flush=True)
-    bed = Bed(options.binary, options.here, options.there, FORGERIES.get(options.forge))
-    started, done, forged, failed, exits = time.monotonic(), 0, 0, [], collections.Counter()
+    bed = TestBed(options.binary, options.here, options.there, PROGRAM_ERRORS.get(options.program_error))
+    started, done, changed, failed, exits = time.monotonic(), 0, 0, [], collections.Counter()
     seeds = (each for each in itertools.count(seed) if options.command in (None, Scenario(each).command))
     while (count is None or done < count) and (options.seconds is None or time.monotonic() - started < options.seconds):
         scenario, since = Scenario(next(seeds)), time.monotonic()
@@ -224,7 +224,7 @@ def main():
                 run, problems = None, [traceback.format_exc()]
         done += 1
         exits[scenario.command, run and run.exit] += 1
-        forged += bool(bed.relay.forged)
+        changed += bool(bed.relay.changed_frames)
         if options.verbose:
             print(f"{scenario.seed} exit {run and run.exit} {time.monotonic() - since:.1f} s: {' '.join(scenario.arguments)}", flush=True)
         if problems:
@@ -235,8 +235,8 @@ def main():
             print(*(f"BROKEN {scenario.seed}: {complaint}" for complaint in problems), sep="\n", flush=True)
     print(", ".join(f"{command} {code}: {number}" for (command, code), number in sorted(exits.items(), key=str)))
     print(f"{done} scenarios from seed {seed} in {time.monotonic() - started:.0f} s, {len(failed)} failed {failed or ''}")
-    if options.forge:
-        print(f"{options.forge}: forged in {forged}")
+    if options.program_error:
+        print(f"{options.program_error}: frames changed in {changed} scenarios")
     bed.relay.end()
     return 1 if failed else 0
 

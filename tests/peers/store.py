@@ -1,14 +1,18 @@
-"""A device on a CAN bus that keeps data: the SDO server of a foreign implementation.
+"""A device on a CAN bus that stores data, with the SDO server of python-canopen or durand.
 
     store.py {canopen|durand} --files DIR [--heartbeat MS] IFACE NODE
 
-2000h is DIR/2000, read again for each upload and replaced by each download; 2001h is the same of
-DIR/2001 and read only, 2002h an UNSIGNED32 and 2003h zeros that take longer than anybody waits.
-Prints "ready" once it has booted, and ends on SIGTERM.
+Its objects:
 
-With canopen 2100h holds what is written to it, one sub-index for each of values.VALUES, and
-DIR/values has a line "SUB VALUE" for each download, as python-canopen understands it; 2101h has the
-values themselves.
+    2000h    the file DIR/2000: an upload reads it, a download replaces it
+    2001h    the file DIR/2001, read-only
+    2002h    UNSIGNED32
+    2003h    zeros, so many that an upload exceeds every time-out
+    2100h    canopen only: stores the written values, one sub-index for each of values.VALUES
+    2101h    canopen only: the values of values.VALUES
+
+For each download to 2100h, DIR/values gets a line "SUB VALUE" with the value as decoded by python-canopen. The program
+prints "ready" when it has booted, and ends on SIGTERM.
 """
 
 import argparse
@@ -37,7 +41,7 @@ class Files:
             return file.read()
 
     def write(self, index, data):
-        # Whole or not at all.
+        # A reader never sees a partial file.
         with open(self.path("new"), "wb") as file:
             file.write(data)
         os.replace(self.path("new"), self.path(f"{index:04X}"))
@@ -121,7 +125,7 @@ def main():
     parser.add_argument("node", metavar="NODE", type=lambda text: int(text, 0))
     arguments = parser.parse_args()
 
-    # Waited for below; blocked here so that every thread started from here on inherits that.
+    # The main thread waits for the signals below. Threads started from here on inherit the blocking.
     ends = {signal.SIGTERM, signal.SIGINT}
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
     end = {"canopen": with_canopen, "durand": with_durand}[arguments.peer](arguments, Files(arguments.files))

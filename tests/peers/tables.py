@@ -95,7 +95,7 @@ def main():
         assert apart.abs().max() < 1e-12, apart
         german = log("german.csv", "--layout", "wide", "--delimiter", ";", "--decimal", ",", "--bom")
         same = pandas.read_csv(german, sep=";", decimal=",")
-        assert list(same.columns) == list(table.columns), "the mark is no part of the first name"
+        assert list(same.columns) == list(table.columns), "the first column name contains the byte order mark"
         assert (same.dtypes == table.dtypes).all(), same.dtypes
     print("pandas reads and draws what log writes")
 

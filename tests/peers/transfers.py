@@ -1,10 +1,10 @@
-"""SDO transfers of cangauge with foreign servers and a foreign client, on real SocketCAN.
+"""SDO transfers with servers of python-canopen and durand and a client of python-canopen, on real SocketCAN.
 
     transfers.py BINARY IFACE [NAME...]
 
-Data of all sizes, both ways, in every way to transfer them: with python-canopen (which knows no
-blocks) and durand (which does) as devices, and with python-canopen as master of a simulated device.
-After every refusal and every Ctrl-C the server must be ready for the next transfer.
+Transfers data of all sizes in both directions, expedited, in segments and in blocks. The devices are made with
+python-canopen (no block transfer) and durand (with block transfer). python-canopen is also the master of a simulated
+device. After every abort and every Ctrl-C the server must accept the next transfer.
 
     tests/socketcan/vcan target/peers/bin/python tests/peers/transfers.py target/debug/cangauge vcan0
 """
@@ -502,7 +502,7 @@ def nmt_without_heartbeat(cangauge, directory):
     with Store(cangauge, directory, "canopen"):
         assert silent("state", NODE) == [(None, "none")]
         assert nmt("state", NODE, "--probe") == [("pre-operational", "heartbeat")]
-        assert cangauge.run(*PATIENT, "sdo", "read", NODE, "1017").out == "0\n", "the probe was not taken back"
+        assert cangauge.run(*PATIENT, "sdo", "read", NODE, "1017").out == "0\n", "the probe did not restore 1017h"
         assert silent("start", NODE) == [(None, "none")]
         assert silent("start", NODE, "--confirm", exit=3) == [(None, "none")]
         assert nmt("state", NODE, "--probe") == [("operational", "heartbeat")]

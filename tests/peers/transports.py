@@ -1,7 +1,11 @@
-"""One table of operations gives the same results on the simulated bus, socketcand and slcan; with an interface, on that
-instead. The judges are not cangauge's: python-can's socketcand client uses our server, a bridge written with
-python-can is the server for our client, python-can's slcan and an adapter written from the command set are at the other
-end of our pseudo terminals.
+"""One table of operations gives the same results on the simulated bus, socketcand and slcan. With INTERFACE, only this
+interface is compared with the simulated bus.
+
+The other ends are independent of cangauge:
+
+- the socketcand client of python-can uses the server of cangauge;
+- a socketcand bridge written with python-can serves the client of cangauge;
+- slcan of python-can and an adapter written from the command set use pseudo terminals.
 
     transports.py PROGRAM [INTERFACE]
 """
@@ -114,8 +118,8 @@ class Thread(threading.Thread):
 
 
 class Bridge(Thread):
-    """A socketcand server in front of a bus of python-can, written from the protocol's document. It cuts its text at odd
-    places."""
+    """A socketcand server in front of a bus of python-can, written from the protocol's document. It sends its text
+    in arbitrary pieces."""
 
     def __init__(self, bus):
         super().__init__()
@@ -304,7 +308,7 @@ def adapter(program, directory, expected, times):
         times["slcan"] = round_trip(program, bus)
 
 
-# Each command waits for 2.5 s until such an adapter counts as mute.
+# Each command waits for 2.5 s until such an adapter counts as silent.
 FEW = [operation for operation in OPERATIONS if operation[0] in ("scan", "store", "log") and "--passive" not in operation]
 
 

@@ -1,7 +1,7 @@
 """Values of each data type, in python-canopen and in cangauge.
 
-Of TIME_OF_DAY and TIME_DIFFERENCE python-canopen knows nothing but the bytes; they are put together
-here from CiA 301, 7.1.6.5 and 7.1.6.6: milliseconds (28 bits), then days (16 bits).
+python-canopen handles TIME_OF_DAY and TIME_DIFFERENCE as bytes. This module encodes them by CiA 301, 7.1.6.5 and
+7.1.6.6: milliseconds (28 bits), then days (16 bits).
 """
 
 import datetime

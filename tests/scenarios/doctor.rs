@@ -172,7 +172,7 @@ fn each_fault_has_its_finding() {
 }
 
 #[test]
-fn nothing_is_found_if_all_is_well() {
+fn bus_without_faults_yields_no_findings() {
     let device = |kind: &str, node: u8, set: &str| {
         format!("[[device]]\nkind = \"{kind}\"\nnode = {node}\nstart = true\nset = {{ {set} }}\n")
     };
@@ -220,7 +220,7 @@ impl Station for Commands {
 }
 
 #[test]
-fn nothing_is_written_or_commanded() {
+fn doctor_sends_no_writes_or_commands() {
     for bench in ["[[device]]\nkind = \"mh4\"\nnode = 5\n", "[[device]]\nkind = \"mc1609\"\nnode = 5\n", ""] {
         let mut bus = Case::of(bench).open();
         bus.attach(Commands::default());

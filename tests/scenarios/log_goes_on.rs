@@ -472,7 +472,7 @@ fn sync_delays_are_measured() {
 }
 
 #[test]
-fn max_gap_decides_what_is_a_gap() {
+fn longer_intervals_than_max_gap_are_gaps() {
     for (longest, gaps) in [(99, 1), (200, 0)] {
         let text = format!("clock = \"virtual\"\n{MH4}");
         let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");

@@ -202,7 +202,7 @@ const ACKNOWLEDGED_TWICE: &[&str] = &["585#6017100000000000", "585#6017100000000
 const WRITES: &str = "605#2B171000";
 
 #[test]
-fn answers_that_arrive_twice_disturb_nothing() {
+fn duplicate_answers_are_ignored() {
     let steps: [Step; 5] = [
         ("605#40181004", TWICE_SERIAL),
         (ASK_NAME, &["585#410810000A000000", "585#410810000A000000"]),

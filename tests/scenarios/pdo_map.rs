@@ -428,7 +428,7 @@ fn a_broken_wire_at_every_step() {
 }
 
 #[test]
-fn a_device_that_is_gone_at_every_step() {
+fn device_disappears_at_every_step() {
     at_each_frame(&[Fault::Gone]);
 }
 

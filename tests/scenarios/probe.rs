@@ -108,7 +108,7 @@ fn probe_keeps_a_record_until_the_heartbeat_is_restored() {
 }
 
 #[test]
-fn next_run_restores_what_a_killed_one_left() {
+fn next_run_restores_changes_of_a_killed_one() {
     let node = NodeId::new(5).expect("a node-ID");
     let object = ObjectId::new(0x1017, 0);
     let left = |identity| {

@@ -490,7 +490,7 @@ fn node_without_values_has_its_reason_after_five_seconds() {
 }
 
 #[test]
-fn short_recording_says_nothing_of_single_signals() {
+fn short_recording_has_no_remarks_on_single_signals() {
     let case = Case::mh4("").sync(10);
     let folder = tempfile::tempdir().expect("a folder");
     let text = format!("clock = \"virtual\"\n{}", case.bench);

@@ -44,7 +44,7 @@ fn the_interface_is_described() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn both_times_are_those_of_the_arrival() {
+fn both_times_are_arrival_times() {
     let can = Can::get();
     let (mut sender, mut bus) = (can.open(), can.open());
     let mut moments = vec![bus.now()];

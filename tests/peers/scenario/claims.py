@@ -108,7 +108,7 @@ def pdo_map(scenario, _, foreign):
 
 
 def run_before(scenario, node, place):
-    return int.from_bytes(scenario.before.held[node].get(place) or b"", "little")
+    return int.from_bytes(scenario.before.objects[node].get(place) or b"", "little")
 
 
 def autozero(scenario, run, foreign):

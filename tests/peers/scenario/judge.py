@@ -67,14 +67,14 @@ def differences(before, after, ignored=lambda place: False):
 def others(scenario, run):
     """A device that was not named keeps its values and its state."""
     problems = []
-    for node, before in run.before.held.items():
+    for node, before in run.before.objects.items():
         if node in scenario.named:
             continue
         meddled = scenario.was_written_by_others(node)
         problems += [f"node {node} was not named: {difference}" for difference in
-                 differences(before, run.after.held[node], lambda place: meddled and place == HEARTBEAT)]
+                 differences(before, run.after.objects[node], lambda place: meddled and place == HEARTBEAT)]
         problems += [f"node {node} was not named, after a reset: {difference}"
-                 for difference in differences(run.fresh.held[node], run.reset.held[node])]
+                 for difference in differences(run.fresh.objects[node], run.reset.objects[node])]
         states = run.before.states[node], run.after.states[node]
         if not scenario.is_commanded_by_others(node) and None not in states and states[0] != states[1]:
             problems.append(f"node {node} was not named: {states[0]} and now {states[1]}")
@@ -84,8 +84,8 @@ def others(scenario, run):
 def own(scenario, run):
     """A named device has changed only in objects of the command."""
     problems = []
-    for node in set(scenario.named) & run.before.held.keys():
-        before, after = run.before.held[node], run.after.held[node]
+    for node in set(scenario.named) & run.before.objects.keys():
+        before, after = run.before.objects[node], run.after.objects[node]
         may = CHANGES.get(scenario.command, lambda index: False) if wire.writes(scenario) else lambda index: False
         resets = scenario.command in ("nmt", "store", "restore", *wire.LSS)
         free = scenario.was_written_by_others(node) or resets
@@ -100,7 +100,7 @@ def own(scenario, run):
         problems += [f"node {node}: {difference}" for difference in differences(before, after, ignored)]
         if not wire.writes(scenario):
             problems += [f"node {node}, after a reset: {difference}"
-                     for difference in differences(run.fresh.held[node], run.reset.held[node])]
+                     for difference in differences(run.fresh.objects[node], run.reset.objects[node])]
         # According to the output of the program.
         if "nothing was changed" in run.err and not scenario.was_written_by_others(node) and not resets:
             problems += [f"node {node}, and nothing was changed: {difference}" for difference in differences(before, after)]
@@ -149,10 +149,10 @@ def configuring(scenario, run):
 def mapping(scenario, run):
     """After a failed `pdo map` the device has the old or the new mapping, or the message names the state and a remedy."""
     node, wanted = scenario.named[0], scenario.wanted
-    if scenario.command != "pdo map" or run.exit in (0, -9) or scenario.restarts(node) or node not in run.before.held:
+    if scenario.command != "pdo map" or run.exit in (0, -9) or scenario.restarts(node) or node not in run.before.objects:
         return []
-    offset, after = wanted["pdo"] - 1, run.after.held[node]
-    half = differences(run.before.held[node], after, lambda place: place[0] not in (0x1800 + offset, 0x1A00 + offset))
+    offset, after = wanted["pdo"] - 1, run.after.objects[node]
+    half = differences(run.before.objects[node], after, lambda place: place[0] not in (0x1800 + offset, 0x1A00 + offset))
     right = [((0x1800 + offset, 2), wanted["code"]), ((0x1800 + offset, 5), wanted["timer"])]
     right += [((0x1A00 + offset, sub), word) for sub, word in enumerate([len(wanted["words"]), *wanted["words"]])] if wanted["words"] else []
     is_new = all(number is None or int.from_bytes(after.get(place) or b"", "little") == number for place, number in right)

@@ -38,7 +38,7 @@ def description(kind):
 
 @functools.cache
 def model(kind):
-    """What only the simulator knows of a device kind."""
+    """The data of a device kind that only the simulator has."""
     with open(os.path.join(HERE, "../../src/sim/models", f"{kind}.toml"), "rb") as file:
         return tomllib.load(file)
 

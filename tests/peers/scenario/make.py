@@ -27,7 +27,7 @@ class Scenario:
         self.devices = [device(rng, place) for place in range(rng.choice((1, 1, 2, 2, 3, 4)))]
         self.command, self.arguments, self.named, self.wanted = command(rng, self)
         self.timing = (rng.choice((100, 300, 300, 500)), rng.choice((0, 1, 1, 2)))
-        self.faults, self.loss, self.happenings, self.rival, self.signal = [], {}, [], [], None
+        self.faults, self.loss, self.events, self.rival, self.signal = [], {}, [], [], None
         if rng.random() < 0.75:
             trouble(rng, self)
         if not self.is_troubled():
@@ -36,14 +36,14 @@ class Scenario:
 
     def is_troubled(self):
         oddities = any(device["lss"] or device["latency"] >= 20 for device in self.devices)
-        return bool(self.faults or self.loss or self.happenings or self.rival or self.signal or oddities)
+        return bool(self.faults or self.loss or self.events or self.rival or self.signal or oddities)
 
     def at(self, node):
         """The device with a node-ID, if there is one."""
         return next((device for device in self.devices if device["node"] == node), None)
 
     def kinds_of_trouble(self):
-        return {fault[2] for fault in self.faults} | {happening[1] for happening in self.happenings} | \
+        return {fault[2] for fault in self.faults} | {event[1] for event in self.events} | \
             ({"lose"} if self.loss else set()) | {act[1] for act in self.rival}
 
     def is_disordered(self):
@@ -56,13 +56,13 @@ class Scenario:
     def is_commanded_by_others(self, node=None):
         """Whether another master sends NMT commands, or a device restarts on its own."""
         commands = [frame[1][1] for _, act, frame in self.rival if act == "commands"]
-        commands += [of for _, what, of in self.happenings if what == "power"]
+        commands += [of for _, what, of in self.events if what == "power"]
         return bool(commands) if node is None else bool({0, node} & set(commands))
 
     def restarts(self, node):
         """Whether it restarts for a reason other than the program."""
         resets = {frame[1][1] for _, act, frame in self.rival if act == "commands" and frame[1][0] in (0x81, 0x82)}
-        return bool({0, node} & (resets | {of for _, what, of in self.happenings if what == "power"}))
+        return bool({0, node} & (resets | {of for _, what, of in self.events if what == "power"}))
 
     def line(self):
         """The command line after the bus option."""
@@ -91,7 +91,7 @@ class Scenario:
         timeout, retries = self.timing
         lines = [f"seed {self.seed}: {' '.join(self.line())}"]
         lines += [f"    device {device}" for device in self.devices]
-        lines += [f"    faults {self.faults} loss {self.loss} happenings {self.happenings} rival {self.rival}"]
+        lines += [f"    faults {self.faults} loss {self.loss} events {self.events} rival {self.rival}"]
         return "\n".join([*lines, f"    signal {self.signal}"])
 
 
@@ -309,17 +309,17 @@ def trouble(rng, scenario):
                      "commands": lambda: (0, bytes([rng.choice((1, 2, 0x80, 0x81, 0x82)), rng.choice((node, node, 0))]))}[act]()
             scenario.rival.append((when(rng, scenario.command), act, frame))
     if "link" in kinds_of:
-        begin = when(rng, scenario.command)
-        scenario.happenings += [(begin, "down", None), (begin + rng.choice((5, 100, 600)), "up", None)]
+        start = when(rng, scenario.command)
+        scenario.events += [(start, "down", None), (start + rng.choice((5, 100, 600)), "up", None)]
     if "stop" in kinds_of:
-        begin = when(rng, scenario.command)
-        scenario.happenings += [(begin, "stopped", None), (begin + rng.choice((20, 150, 800, 2500)), "continued", None)]
+        start = when(rng, scenario.command)
+        scenario.events += [(start, "stopped", None), (start + rng.choice((20, 150, 800, 2500)), "continued", None)]
     if "power" in kinds_of and nodes:
-        scenario.happenings.append((when(rng, scenario.command), "power", rng.choice(nodes)))
+        scenario.events.append((when(rng, scenario.command), "power", rng.choice(nodes)))
     if "cut" in kinds_of:
-        begin = when(rng, scenario.command)
-        scenario.happenings.append((begin, "cut", None))
+        start = when(rng, scenario.command)
+        scenario.events.append((start, "cut", None))
         if rng.random() < 0.6:
-            scenario.happenings.append((begin + rng.choice((5, 50, 300, 1500)), "joined", None))
+            scenario.events.append((start + rng.choice((5, 50, 300, 1500)), "joined", None))
     if rng.random() < 0.3:
         scenario.signal = (rng.choice(("SIGINT", "SIGTERM", "SIGKILL")), when(rng, scenario.command))

@@ -1,6 +1,6 @@
 """Reads the devices from their side of the relay: their values and NMT states.
 
-Plain sockets, all nodes side by side; SDO as CiA 301 prints it.
+Uses plain sockets and the SDO frames of CiA 301, for all nodes at the same time.
 """
 
 import select

@@ -1,8 +1,7 @@
-"""The bus between the program and the devices: a relay that forwards in both directions, keeps a record, and makes
-what goes wrong.
+"""The bus between the program and the devices: a relay that forwards in both directions, keeps a record and makes faults.
 
-Frames that the program sends are all that arrive on its side: the relay does not hear itself. So its record
-shows which frames are from the program, and which are from the devices or another master on their side.
+The relay does not receive its own frames. On the side of the program it receives only frames of the program. All other
+frames are from the devices or from another master on their side.
 """
 
 import errno
@@ -54,14 +53,14 @@ def text(identifier, data):
 class Relay(threading.Thread):
     """Forwards between the two interfaces while it is `open`, and makes the faults of a scenario.
 
-    Faults of single frames, (direction, number, kind, milliseconds): lose, double, delay, garble, truncate.
-    Happenings, (milliseconds after the program's first frame, function, remark), are done when they are due.
+    A fault changes a single frame: (direction, number, kind, milliseconds). Its kind is lose, double, delay, garble or
+    truncate. An event is (milliseconds after the program's first frame, function, remark).
     """
 
-    def __init__(self, here, there, forgery=None):
+    def __init__(self, here, there, program_error=None):
         super().__init__(daemon=True)
-        # The forgery (see scenario/forge.py), and the number of frames that it changed.
-        self.forgery, self.forged = forgery, 0
+        # A simulated error of the program (see wrong_program.py), and the number of frames that it changed.
+        self.program_error, self.changed_frames = program_error, 0
         self.interface = here
         self.sides = {OUT: can_socket(here), IN: can_socket(there)}
         self.rival = can_socket(there)
@@ -71,20 +70,20 @@ class Relay(threading.Thread):
         self.ticket = itertools.count()
         self.wake_reader, self.wake_writer = os.pipe()
         self.is_open, self.is_cut, self.running = False, False, True
-        self.begin([], {}, 0, [])
+        self.start_record([], {}, 0, [])
         self.start()
 
-    def begin(self, faults, loss, seed, happenings):
+    def start_record(self, faults, loss, seed, events):
         """Starts a new record with new faults; `loss` is the percentage of frames lost in each direction."""
         with self.lock:
             self.faults = {(direction, number): (kind, ms) for direction, number, kind, ms in faults}
             self.loss, self.random = dict(loss), random.Random(seed)
-            self.happenings = sorted(happenings, key=lambda happening: happening[0])
+            self.events = sorted(events, key=lambda event: event[0])
             self.count = {OUT: 0, IN: 0}
             self.stalled = {OUT: 0.0, IN: 0.0}
             self.delayed = []
             self.record = []
-            self.forged = 0
+            self.changed_frames = 0
             self.first = None
             self.is_cut = False
             # The frames that wait in the sockets are from the previous scenario.
@@ -97,14 +96,14 @@ class Relay(threading.Thread):
     def close(self):
         """Stops forwarding. Delayed frames are lost."""
         with self.lock:
-            self.is_open, self.delayed, self.happenings = False, [], []
+            self.is_open, self.delayed, self.events = False, [], []
 
     def calm(self):
         """Ends all faults. Delayed frames are still delivered."""
         with self.acting, self.lock:
-            self.faults, self.loss, self.happenings, self.is_cut = {}, {}, [], False
+            self.faults, self.loss, self.events, self.is_cut = {}, {}, [], False
 
-    def begin_now(self):
+    def start_clock(self):
         """Counts the run as started even if the program has not sent a frame."""
         with self.lock:
             self.first = self.first or time.monotonic()
@@ -121,8 +120,7 @@ class Relay(threading.Thread):
         for number in (*ways, self.wake_reader):
             poller.register(number, select.POLLIN)
         while self.running:
-            events = poller.poll(self._wait())
-            for number, _ in events:
+            for number, _ in poller.poll(self._wait()):
                 if number == self.wake_reader:
                     os.read(number, 64)
                 else:
@@ -132,8 +130,8 @@ class Relay(threading.Thread):
     def _wait(self):
         with self.lock:
             due = [self.delayed[0][0]] if self.delayed else []
-            if self.first and self.happenings:
-                due.append(self.first + self.happenings[0][0] / 1000)
+            if self.first and self.events:
+                due.append(self.first + self.events[0][0] / 1000)
         return max(0, (min(due) - time.monotonic()) * 1000) if due else None
 
     def _read(self, direction):
@@ -149,10 +147,10 @@ class Relay(threading.Thread):
                     raise
                 continue
             identifier, data = unpack(raw)
-            forged = self.forgery(direction, identifier, data) if self.forgery and self.is_open else None
-            self.forged += forged is not None
+            changed = self.program_error(direction, identifier, data) if self.program_error and self.is_open else None
+            self.changed_frames += changed is not None
             with self.lock:
-                for frame in [(direction, identifier, data)] if forged is None else forged:
+                for frame in [(direction, identifier, data)] if changed is None else changed:
                     self._pass(*frame)
 
     def _pass(self, direction, identifier, data):
@@ -216,9 +214,9 @@ class Relay(threading.Thread):
         while True:
             with self.acting:
                 with self.lock:
-                    if not (self.first and self.happenings and self.first + self.happenings[0][0] / 1000 <= time.monotonic()):
+                    if not (self.first and self.events and self.first + self.events[0][0] / 1000 <= time.monotonic()):
                         return
-                    _, act, remark = self.happenings.pop(0)
+                    _, act, remark = self.events.pop(0)
                     self.record.append((time.monotonic(), "", remark, 0, None, None))
                 act()
 
