@@ -8,6 +8,7 @@ use super::{Global, descriptions, open};
 use crate::bus::Stamp;
 use crate::bus::claim::{Claim, Claims};
 use crate::canopen::id::NodeId;
+use crate::master::Master;
 use crate::measure::expression::Expression;
 use crate::measure::expression::evaluator::Evaluator;
 use crate::measure::sample::{Sample, Source};
@@ -16,7 +17,8 @@ use crate::output::console::Console;
 use crate::output::events::{event_text, remark_text};
 use crate::output::failure::ErrorMessage;
 use crate::output::{junit, verdict};
-use crate::tasks::check::{CheckOptions, CheckReport, all_satisfied, check};
+use crate::tasks::check::{CheckOptions, CheckReport, all_satisfied, check, check_figures};
+use crate::tasks::health::{self, HealthOptions};
 use crate::tasks::log::{LogEvent, Mode, Observer};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
@@ -39,6 +41,8 @@ Expressions (quote each of them; all must be satisfied):
   'noise(pressure) < 0.01 bar'       functions of all samples: mean, min, max, noise (standard
                                      deviation), rate (1/s), gap (longest interval, s), count,
                                      invalid (number of invalid samples; they do not fail this check)
+  'bus.load < 60 %'                  figures of the bus and of each node, as in cangauge health:
+  'node.heartbeat.max < 1.1 s'       bus.load.peak, bus.errors, node.sdo.p99, node.emcy, node.restarts
   < <= > >= == != in, + - * /, | |, ( ), and, or, not; pressure.status, 0x6130:1
 
 Equality: calculated values are equal if they differ by less than 1e-9 of the larger one.
@@ -119,28 +123,75 @@ impl Check {
                 let message = format!("{}() needs more than one reading", function.as_str());
                 Err(ErrorMessage::usage(message).hint("measure for some time: --for 10s").into())
             }
-            None => Ok(()),
+            None => self.validate_figures(is_replay),
         }
     }
 
-    /// `waited` is the part of the time that has passed.
+    /// Checks the names of figures, and that they are measured for some time.
+    fn validate_figures(&self, is_replay: bool) -> anyhow::Result<()> {
+        let known = health::names();
+        for expression in &self.expressions {
+            let figures = expression.figures();
+            let Some(first) = figures.first() else { continue };
+            let error = |message: String, hint: &str| ErrorMessage::usage(message).hint(hint.to_owned());
+            if let Some(unknown) = figures.iter().find(|name| !known.contains(*name)) {
+                return Err(
+                    error(format!("no figure \"{unknown}\""), "list the figures: cangauge health -f csv").into()
+                );
+            }
+            if figures.len() < expression.wanted().len() {
+                let message = format!("\"{}\" compares {first} with a measured value", expression.text());
+                return Err(error(message, "check them in two expressions").into());
+            }
+            if self.duration.is_none() && !is_replay {
+                let message = format!("{first} needs some time");
+                return Err(error(message, "measure for some time: --for 10s").into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Measures the signals, and then the figures of the bus and of the nodes.
     fn measure(&self, global: &Global, waited: StdDuration) -> anyhow::Result<CheckReport> {
+        let (figures, signals): (Vec<Expression>, Vec<Expression>) =
+            self.expressions.iter().cloned().partition(|expression| !expression.figures().is_empty());
+        if figures.is_empty() {
+            return self.measure_signals(&signals, global, waited);
+        }
+        let measured = global.with_master(|master| {
+            let (nodes, reads) = (live_nodes(&self.nodes, master, global)?, master.bus().is_live());
+            let (duration, bit_rate) = (self.duration.map(|duration| duration.0.saturating_sub(waited)), None);
+            let overrides = descriptions::overrides(global, &nodes)?;
+            Ok(check_figures(master, &figures, &HealthOptions { nodes, reads, duration, bit_rate, overrides })?)
+        })?;
+        if signals.is_empty() {
+            return Ok(measured);
+        }
+        let mut report = self.measure_signals(&signals, global, waited)?;
+        report.verdicts.extend(measured.verdicts);
+        Ok(report)
+    }
+
+    /// `waited` is the part of the time that has passed.
+    fn measure_signals(
+        &self,
+        expressions: &[Expression],
+        global: &Global,
+        waited: StdDuration,
+    ) -> anyhow::Result<CheckReport> {
         let duration = self.duration.map(|duration| duration.0.saturating_sub(waited));
         let progress = CheckProgress::new(duration.is_some() && global.shows_progress(), duration.unwrap_or_default());
         let console = Console { progress: Some(progress.multi()), ..global.console() };
         global.with_claims(|master, claims| {
             // A replayed recording is receive-only, and is checked from its start to its end.
             let live = master.bus().is_live();
-            let nodes = match &self.nodes {
-                Nodes::All if !live => NodeId::all().collect(),
-                nodes => open::nodes(master, global, nodes)?,
-            };
+            let nodes = live_nodes(&self.nodes, master, global)?;
             let mode = if live { self.mode() } else { Mode::Passive };
             let options = CheckOptions {
                 overrides: descriptions::overrides_on(master, global, &nodes)?,
                 nodes,
                 skip_unsupported: self.nodes == Nodes::All,
-                expressions: self.expressions.clone(),
+                expressions: expressions.to_vec(),
                 recording: (duration.is_some() || !live).then_some((mode, duration)),
             };
             // Without --poll, the nodes are only used until the recording starts.
@@ -159,6 +210,14 @@ impl Check {
             (None, Some(period)) => Mode::Poll(period.0),
             (None, None) => Mode::AsSent,
         }
+    }
+}
+
+/// The nodes to check; in a recording, `all` means every node-ID.
+fn live_nodes(nodes: &Nodes, master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
+    match nodes {
+        Nodes::All if !master.bus().is_live() => Ok(NodeId::all().collect()),
+        nodes => open::nodes(master, global, nodes),
     }
 }
 

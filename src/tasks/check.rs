@@ -1,8 +1,10 @@
 //! Checks measurements against expressions: one reading by SDO, or all samples of a recording.
 
 mod failure;
+mod figures;
 
 pub use failure::CheckFailure;
+pub use figures::check_figures;
 
 use crate::bus::Stamp;
 use crate::canopen::id::NodeId;

@@ -6,7 +6,7 @@ mod figures;
 mod load;
 mod tally;
 
-pub use figures::{Figure, Verdict, figures};
+pub use figures::{Figure, Verdict, figures, names};
 pub use load::Load;
 pub use tally::{NodeTally, Spread};
 

@@ -112,3 +112,21 @@ fn absent_node_and_wrong_options() {
     assert!(bench.run("health --bitrate fast").exit(2).stderr.contains("\"fast\" is not a CAN bit rate"));
     assert!(replay(&bench, "").exit(8).stderr.contains("t.log"));
 }
+
+#[test]
+fn figures_are_signals_of_check() {
+    let bench = Bench::described(&(device(5, "set = { \"0x1017\" = 1000 }") + &device(6, "latency = \"30ms\"")));
+    let figures = ["bus.load < 60 %", "node.sdo.p99 < 0.1 s", "5.node.heartbeat.max < 1.1 s", "bus.errors == 0"];
+    let words: Vec<&str> = ["check", "5,6"].into_iter().chain(figures).chain(["--for", "10s"]).collect();
+    bench.run_words(&words).exit(0);
+    let done =
+        bench.run_words(&["check", "5,6", "node.sdo.max < 20 ms", "bus.load < 0.1 %", "--for", "5s", "-f", "json"]);
+    let verdicts = done.exit(1).json();
+    let outcome = |node: Value| verdicts.iter().find(|row| row["node"] == node).map(|row| row["verdict"].clone());
+    assert_eq!(outcome(json!(5)), Some(json!("ok")), "{verdicts:?}");
+    assert_eq!(outcome(json!(6)), Some(json!("fail")), "{verdicts:?}");
+    assert_eq!(outcome(Value::Null), Some(json!("fail")), "{verdicts:?}");
+    bench.run_words(&["check", "5", "bus.load < 60 %"]).refuses("bus.load needs some time");
+    bench.run_words(&["check", "5", "bus.lod < 60 %", "--for", "1s"]).refuses("no figure \"bus.lod\"");
+    bench.run_words(&["check", "5", "pressure < 100 bar", "bus.load < 60 %", "--for", "2s", "--poll", "100ms"]).exit(0);
+}

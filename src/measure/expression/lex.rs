@@ -1,7 +1,7 @@
 //! Splits the text of an expression into tokens.
 
-use super::LocatedError;
 use super::tree::{Position, SignalName};
+use super::{FIGURES, LocatedError};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
@@ -26,8 +26,7 @@ const SIGNS: [&str; 16] =
     ["..", "<=", ">=", "==", "!=", "<", ">", "+", "-", "*", "/", "(", ")", "|", "\u{2264}", "\u{2265}"];
 
 /// Signs of other languages, and what to use here.
-const FOREIGN_SIGNS: [(&str, &str); 4] =
-    [("&&", "and"), ("=", "=="), ("!", "not"), ("%", "a number in the unit of the signal")];
+const FOREIGN_SIGNS: [(&str, &str); 3] = [("&&", "and"), ("=", "=="), ("!", "not")];
 
 /// Returns all tokens of a text with their positions.
 pub(super) fn tokens(text: &str) -> Result<Vec<(Token, Position)>, LocatedError> {
@@ -61,8 +60,15 @@ fn token(text: &str, at: Position) -> Result<(Token, usize), LocatedError> {
         let what = Wanted::Signal(inner.trim().to_owned());
         return Ok((Token::Signal(SignalName { node: None, what, at }), length));
     }
+    if first == '%' {
+        return Ok((Token::Word("%".to_owned()), 1));
+    }
     if is_letter(first) {
         let word = name(text);
+        if let Some(length) = figure(text) {
+            let what = Wanted::Signal(text[..length].to_owned());
+            return Ok((Token::Signal(SignalName { node: None, what, at }), length));
+        }
         if let Some(length) = numbered(text, word) {
             let what = Wanted::Signal(text[..length].to_owned());
             return Ok((Token::Signal(SignalName { node: None, what, at }), length));
@@ -111,6 +117,18 @@ fn name(text: &str) -> &str {
         end = at + letter.len_utf8();
     }
     &text[..end]
+}
+
+/// The length of the name of a figure of the bus or of a node: `bus.load`, `node.heartbeat.max`.
+fn figure(text: &str) -> Option<usize> {
+    let mut length = FIGURES.into_iter().find(|prefix| text.starts_with(prefix))?.len();
+    loop {
+        length += name(&text[length..]).len();
+        match text[length..].strip_prefix('.').map(name) {
+            Some(part) if !part.is_empty() => length += 1,
+            _ => return Some(length),
+        }
+    }
 }
 
 /// The length of a name with a sub-index: `ai-input-pv:1`.

@@ -37,6 +37,9 @@ use tree::{Condition, Position, SignalName};
 /// The longest expression, in characters. It limits how deeply the tree can be nested.
 const MAX_LENGTH: usize = 1000;
 
+/// The prefixes of figures of the bus and of a node, which are no signals of a device: `bus.load`.
+const FIGURES: [&str; 2] = ["bus.", "node."];
+
 /// An expression: one or several conditions that must all be true.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
@@ -89,6 +92,12 @@ impl Expression {
             }
         }
         wanted
+    }
+
+    /// The figures of the bus and of nodes in this expression, without repetitions: `bus.load`, `node.heartbeat.max`.
+    pub fn figures(&self) -> Vec<String> {
+        let names = self.wanted().into_iter().map(|wanted| wanted.name());
+        names.filter(|name| FIGURES.iter().any(|prefix| name.starts_with(prefix))).collect()
     }
 
     /// The first function that needs more than one sample, for example `noise` or `rate`.

@@ -1,7 +1,9 @@
 //! The figures as a list with verdicts.
 
-use super::{Health, NodeTally};
+use super::{Controller, Health, NodeTally};
 use crate::canopen::id::NodeId;
+use crate::tasks::monitor::FrameKind;
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// The limit for the mean load. Messages with a low priority wait long above it.
@@ -105,6 +107,14 @@ pub fn figures(health: &Health) -> Vec<Figure> {
     );
     all.extend(health.nodes.iter().flat_map(|(&node, tally)| of_node(node, tally, health)));
     all
+}
+
+/// The names of all figures.
+pub fn names() -> BTreeSet<String> {
+    let controller = Some(Controller { state: "", tx_errors: None, rx_errors: None });
+    let frames = FrameKind::ALL.map(|kind| (kind, 0)).into();
+    let nodes = [(NodeId::MIN, NodeTally::default())].into();
+    figures(&Health { controller, frames, nodes, ..Health::default() }).into_iter().map(|figure| figure.name).collect()
 }
 
 fn of_node(node: NodeId, tally: &NodeTally, health: &Health) -> Vec<Figure> {
