@@ -6,7 +6,7 @@ use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
-use crate::measure::sample::{Doubt, Sample};
+use crate::measure::sample::{Doubt, Sample, Source};
 use crate::output::doubt;
 use crate::output::failure::ErrorMessage;
 use crate::output::read::ReadValue;
@@ -27,14 +27,16 @@ pub(crate) struct Read {
     nodes: Nodes,
     /// pressure, temperature, ch1 to ch16, pressure.status, or an object, unscaled: 0x6130:1, 0x6010:0/i16
     signals: Vec<SignalArg>,
-    /// Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K
+    /// Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K. Without SIGNAL, other quantities keep their unit
     #[arg(long = "in", value_name = "UNIT", value_parser = parse_unit)]
     unit: Option<Unit>,
 }
 
 pub(super) fn parse_unit(text: &str) -> Result<Unit, String> {
-    Unit::from_symbol(text)
-        .ok_or_else(|| format!("\"{text}\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x4E0000)"))
+    Unit::from_symbol(text).ok_or_else(|| match Unit::spellings(text).as_slice() {
+        [] => format!("\"{text}\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x4E0000)"),
+        several => format!("the unit \"{text}\" is ambiguous: {}", several.join(" or ")),
+    })
 }
 
 impl Read {
@@ -66,7 +68,7 @@ impl Read {
             failures = failed;
             without.iter().for_each(|failure| global.console().note(&ErrorMessage::from(failure).message));
         }
-        let reports: Vec<ReadValue<'_>> = values.iter().map(|value| self.report(value, is_bare)).collect();
+        let reports: Vec<ReadValue<'_>> = values.iter().map(|value| report(value, is_bare)).collect();
         global.print(&reports)?;
         Ok(several(asked, failures)?)
     }
@@ -81,28 +83,44 @@ impl Read {
                 global.console().warn(&doubt::doubt(node, signal, doubt));
             }
         }
+        let converts = |(target, _): &(Target, Sample)| self.unit.is_some_and(|unit| target.unit_for(unit).is_ok());
+        let converts_any = self.signals.is_empty() && readings.iter().any(converts);
         let convert = |(target, sample): (Target, Sample)| {
-            let converted = self.unit.map(|unit| target.convert(sample.value, unit)).transpose()?;
+            let converted = match self.unit.map(|unit| target.convert(sample.value, unit)).transpose() {
+                // Without SIGNAL, a signal of another quantity keeps its unit.
+                Err(_) if converts_any => {
+                    global.console().note(&kept_unit(&target));
+                    None
+                }
+                result => result?,
+            };
             // An empty line is not a number.
             if is_bare && global.prints_text() && sample.value.is_none() {
                 return Err(no_value(&target, &sample));
             }
-            Ok((target, sample, converted.flatten()))
+            Ok((target, sample, converted))
         };
         readings.into_iter().map(convert).collect()
     }
+}
 
-    fn report<'a>(&self, (target, sample, converted): &'a Converted, is_bare: bool) -> ReadValue<'a> {
-        let value = ReadValue::new(&target.source, sample, is_bare);
-        match self.unit {
-            Some(unit) => value.converted(*converted, unit),
-            None => value,
-        }
+fn report((target, sample, converted): &Converted, is_bare: bool) -> ReadValue<'_> {
+    let value = ReadValue::new(&target.source, sample, is_bare);
+    match *converted {
+        Some((converted, unit)) => value.converted(converted, unit),
+        None => value,
     }
 }
 
-/// A reading, and its value in the requested unit.
-type Converted = (Target, Sample, Option<f64>);
+/// Note about a signal that `--in` does not convert.
+fn kept_unit(target: &Target) -> String {
+    let Source { node, signal, unit, .. } = &target.source;
+    let unit = if unit.is_empty() { "no unit" } else { unit };
+    format!("node {node}: {signal} is not converted ({unit})")
+}
+
+/// A reading, and its value in the requested unit, with this unit.
+type Converted = (Target, Sample, Option<(Option<f64>, Unit)>);
 
 /// Why a reading has no value.
 fn no_value(target: &Target, sample: &Sample) -> Failure {

@@ -115,6 +115,16 @@ const EXTRA: [&str; 13] =
 /// The first code of [`EXTRA`].
 const EXTRA_CODES: u32 = 0xffff_ff00;
 
+const COULOMB: Unit = Unit(0x0025_0000);
+const FARAD: Unit = Unit(0x0027_0000);
+const DEGREE_CELSIUS: Unit = Unit(0x002d_0000);
+const DEGREE_FAHRENHEIT: Unit = Unit(0x00ac_0000);
+
+/// A symbol without the degree sign and the micro signs.
+fn ascii(text: &str) -> String {
+    text.replace('\u{b0}', "deg").replace(['\u{b5}', '\u{3bc}'], "u")
+}
+
 impl Unit {
     /// No dimension.
     pub const NONE: Unit = Unit(0);
@@ -151,8 +161,49 @@ impl Unit {
         }
     }
 
-    /// The unit of a symbol: `bar`, `mbar`, `kPa`, `°C` or `degC`, `deg/s`, or a raw code `0x…`.
+    /// The unit of a symbol: `bar`, `mbar`, `kPa`, `°C` or `degC`, `deg/s`, or a raw code `0x…`. Another case (`PSI`) is
+    /// accepted if it means one unit only.
     pub fn from_symbol(text: &str) -> Option<Unit> {
+        Unit::from_exact(text).or_else(|| match Unit::spellings(text).as_slice() {
+            [only] => Unit::from_exact(only),
+            _ => None,
+        })
+    }
+
+    /// The symbols that are equal to `text` except for their case: MPa and mPa for `mpa`.
+    pub fn spellings(text: &str) -> Vec<String> {
+        let text = ascii(text);
+        let denominator = text.split_once('/').map_or("", |(_, denominator)| denominator);
+        let symbols = || BASES.iter().map(|base| base.symbol);
+        let mut found: Vec<String> = EXTRA.map(str::to_owned).to_vec();
+        for below in [""].into_iter().chain(symbols()).filter(|below| below.eq_ignore_ascii_case(denominator)) {
+            let slash = if below.is_empty() { "" } else { "/" };
+            let prefixes = || PREFIXES.iter().map(|(_, prefix)| prefix);
+            found.extend(
+                symbols().flat_map(|symbol| prefixes().map(move |prefix| format!("{prefix}{symbol}{slash}{below}"))),
+            );
+        }
+        found.retain(|symbol| symbol.eq_ignore_ascii_case(&text));
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// The unit that a user means for a value in the unit `other`: for a temperature, `C` and `F` are degrees.
+    #[must_use]
+    pub fn beside(self, other: Unit) -> Unit {
+        match self {
+            COULOMB if other.is_temperature() => DEGREE_CELSIUS,
+            FARAD if other.is_temperature() => DEGREE_FAHRENHEIT,
+            unit => unit,
+        }
+    }
+
+    fn is_temperature(self) -> bool {
+        matches!(self.scale(), Some((Quantity::Temperature, ..)))
+    }
+
+    fn from_exact(text: &str) -> Option<Unit> {
         if text.starts_with("0x") || text.starts_with("0X") {
             return crate::canopen::id::parse_u32(text).map(Unit);
         }
@@ -160,7 +211,7 @@ impl Unit {
         {
             return Some(Unit(code));
         }
-        let text = text.replace('\u{b0}', "deg").replace(['\u{b5}', '\u{3bc}'], "u");
+        let text = ascii(text);
         let (numerator, denominator) = match text.split_once('/') {
             Some((numerator, symbol)) => (numerator, BASES.iter().find(|base| base.symbol == symbol)?.code),
             None => (text.as_str(), 0),
@@ -248,6 +299,41 @@ mod tests {
         assert_eq!(Unit::from_symbol("\u{b0}C"), Some(Unit(0x002D_0000)));
         assert_eq!(Unit::from_symbol("0x004E0000"), Some(Unit(0x004E_0000)));
         assert_eq!(Unit::from_symbol("mmHg"), None);
+    }
+
+    #[test]
+    fn another_case_is_accepted_if_it_means_one_unit() {
+        for (text, symbol) in [
+            ("PSI", "psi"),
+            ("Bar", "bar"),
+            ("KPA", "kPa"),
+            ("hpa", "hPa"),
+            ("\u{b0}c", "degC"),
+            ("DEGF", "degF"),
+            ("k", "K"),
+            ("L/MIN", "l/min"),
+        ] {
+            assert_eq!(Unit::from_symbol(text), Unit::from_symbol(symbol), "{text}");
+        }
+        for text in ["mpa", "MBAR", "pa", "MM", "M/S", "bar/", "mmhg"] {
+            assert_eq!(Unit::from_symbol(text), None, "{text}");
+        }
+        assert_eq!(Unit::spellings("mpa"), ["MPa", "mPa"]);
+    }
+
+    #[test]
+    fn c_and_f_are_degrees_for_a_temperature_only() {
+        let unit = |symbol| Unit::from_symbol(symbol).expect("a unit");
+        for (text, other, means) in [
+            ("C", "K", "degC"),
+            ("c", "degF", "degC"),
+            ("F", "degC", "degF"),
+            ("C", "A", "C"),
+            ("F", "psi", "F"),
+            ("mC", "K", "mC"),
+        ] {
+            assert_eq!(unit(text).beside(unit(other)).to_string(), means, "{text} {other}");
+        }
     }
 
     #[test]

@@ -52,17 +52,25 @@ impl Target {
         value.ok().and_then(|(bits, _)| bits.as_u64()).is_some_and(|bits| bits & u64::from(mask) == u64::from(mask))
     }
 
-    /// A value in another unit.
+    /// The unit of this target, and the unit that `to` means for it.
     ///
     /// # Errors
     /// The units do not convert.
-    pub fn convert(&self, value: Option<Number>, to: Unit) -> Result<Option<f64>, Failure> {
-        let fail = || {
+    pub fn unit_for(&self, to: Unit) -> Result<(Unit, Unit), Failure> {
+        let units = self.unit.map(|from| (from, to.beside(from))).filter(|(from, to)| from.convert(0.0, *to).is_some());
+        units.ok_or_else(|| {
             let signal = self.source.signal.to_string();
             Failure::at(self.source.node, ReadFailure::NotConvertible { signal, from: self.unit, to })
-        };
-        let from = self.unit.ok_or_else(fail)?;
-        value.map(|value| from.convert(value.as_f64(), to).ok_or_else(fail)).transpose()
+        })
+    }
+
+    /// A value in another unit, with this unit.
+    ///
+    /// # Errors
+    /// The units do not convert.
+    pub fn convert(&self, value: Option<Number>, to: Unit) -> Result<(Option<f64>, Unit), Failure> {
+        let (from, to) = self.unit_for(to)?;
+        Ok((value.and_then(|value| from.convert(value.as_f64(), to)), to))
     }
 }
 

@@ -78,6 +78,25 @@ fn units_are_converted() {
 }
 
 #[test]
+fn units_are_found_in_another_case_and_c_means_degrees() {
+    let bench = constant();
+    check(&bench, &["127", "pressure in 3.44..3.45 BAR"]).prints("ok    pressure in 3.44..3.45 BAR  3.447379 bar\n");
+    check(&bench, &["5", "temperature in 77..78 F"]).prints("ok    temperature in 77..78 F  77.9 degF\n");
+    check(&bench, &["5", "20 C < temperature", "temperature < 26 \u{b0}c", "temperature + 1 C < 26.6"]).exit(0);
+    check(&bench, &["5", "pressure < 5 C"]).exit(2);
+    check(&bench, &["5", "pressure < 5 mpa"]).refuses("the unit \"mpa\" is ambiguous: MPa or mPa");
+}
+
+#[test]
+fn an_unquoted_comparison_is_suspected() {
+    let stderr = check(&constant(), &["5", "pressure"]).exit(2).stderr;
+    assert!(
+        stderr.ends_with("hint: the shell takes an unquoted > or < as a redirection; quote it: 'pressure > 5 bar'\n"),
+        "{stderr}"
+    );
+}
+
+#[test]
 fn each_node_is_checked() {
     let bench = constant();
     let done = check(&bench, &["5,127", "pressure < 2 bar", "5.temperature < 60"]).exit(1);

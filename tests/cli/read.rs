@@ -70,6 +70,29 @@ fn values_are_converted_to_another_unit() {
 }
 
 #[test]
+fn units_are_found_in_another_case_and_c_means_degrees() {
+    let bench = constant();
+    bench.run("read 127 pressure --in BAR").prints("3.4474\n");
+    let done = bench.run("read 5 temperature --in F -f csv").exit(0);
+    assert!(done.stdout.contains(",degF,"), "{}", done.stdout);
+    bench.run("read 5 pressure --in C").fails(2, "cangauge: node 5: pressure is in bar, which does not convert to C\n");
+    bench.run("read 5 pressure --in MBAR").refuses("the unit \"MBAR\" is ambiguous: Mbar or mbar");
+    bench.run("unit 5 temperature f").exit(0);
+    bench.run("unit 5 pressure PSI").exit(0);
+}
+
+#[test]
+fn signals_of_another_quantity_keep_their_unit() {
+    let bench = constant();
+    let done = bench.run("read 5 --in psi -f csv").exit(0);
+    assert!(done.stdout.contains("5,pressure,18.12972,psi,") && done.stdout.contains(",degC,"), "{}", done.stdout);
+    assert_eq!(done.stderr, "node 5: temperature is not converted (degC)\n");
+    bench.run("read 5 pressure temperature --in psi").exit(2);
+    // Nothing converts.
+    bench.run("read 5 --in mV").exit(2);
+}
+
+#[test]
 fn objects_and_status_objects() {
     let bench = constant();
     bench.run("read 5 0x6130:1").prints("1.25\n");

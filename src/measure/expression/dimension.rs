@@ -52,6 +52,14 @@ impl Typed {
         matches!(self.dimension, Dimension::In(_, Offsets::Literal))
     }
 
+    /// Replaces the unit of a number by the one that it means for a value in `other`.
+    fn beside(mut self, other: Dimension) -> Typed {
+        if let (Dimension::In(unit, Offsets::Literal), Dimension::In(other, _)) = (self.dimension, other) {
+            self.dimension = Dimension::In(unit.beside(other), Offsets::Literal);
+        }
+        self
+    }
+
     /// The unit of the device, if the quantity was measured in it.
     fn measured_unit(&self) -> Option<Unit> {
         match self.dimension {
@@ -123,8 +131,14 @@ pub(super) fn bare_limit(sides: &[&Typed]) -> Option<BareLimit> {
     (!is_stated).then_some(BareLimit { limit, unit })
 }
 
+fn beside_each_other(first: Typed, second: Typed) -> (Typed, Typed) {
+    let (one, other) = (first.dimension, second.dimension);
+    (first.beside(other), second.beside(one))
+}
+
 /// Converts two quantities to one unit: that of a number with a unit, else that of the first quantity.
 pub(super) fn to_one_unit(first: Typed, second: Typed) -> Result<(Typed, Typed), LocatedError> {
+    let (first, second) = beside_each_other(first, second);
     if second.is_literal() {
         Ok((first.converted(&second)?, second))
     } else {
@@ -135,6 +149,7 @@ pub(super) fn to_one_unit(first: Typed, second: Typed) -> Result<(Typed, Typed),
 
 /// Converts a value and its two limits to one unit.
 pub(super) fn within(value: Typed, low: Typed, high: Typed) -> Result<[Typed; 3], LocatedError> {
+    let (low, high) = (low.beside(value.dimension), high.beside(value.dimension));
     let value = match [&high, &low].into_iter().find(|limit| limit.is_literal()) {
         Some(limit) => value.converted(limit)?,
         None => value,
@@ -152,6 +167,7 @@ pub(super) fn calculate(
     name: String,
 ) -> Result<Typed, LocatedError> {
     let start = first.at;
+    let (first, second) = beside_each_other(first, second);
     let (first, second) = match operator {
         Operator::Multiply => (first, second),
         // The measured value determines the unit of a sum.

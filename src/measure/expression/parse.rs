@@ -37,8 +37,15 @@ impl Parsed {
     fn condition(self, end: Position) -> Result<(Condition, Position), LocatedError> {
         match self {
             Parsed::Condition(condition, at) => Ok((condition, at)),
-            Parsed::Quantity(_) => Err(LocatedError::new(end, "expected a comparison: < <= > >= == != or in")
-                .hint("examples: pressure < 10, pressure in 9.95..10.05")),
+            Parsed::Quantity(quantity) => {
+                let hint = match quantity {
+                    Quantity::Signal(_) => {
+                        "the shell takes an unquoted > or < as a redirection; quote it: 'pressure > 5 bar'"
+                    }
+                    _ => "examples: pressure < 10 bar, pressure in 9.95..10.05 bar",
+                };
+                Err(LocatedError::new(end, "expected a comparison: < <= > >= == != or in").hint(hint))
+            }
         }
     }
 }
@@ -271,6 +278,11 @@ impl Parser {
             return Ok(None);
         }
         let unit = Unit::from_symbol(&word).ok_or_else(|| {
+            let spellings = Unit::spellings(&word);
+            if !spellings.is_empty() {
+                let message = format!("the unit \"{word}\" is ambiguous: {}", spellings.join(" or "));
+                return LocatedError::new(self.at(), message);
+            }
             LocatedError::new(self.at(), format!("unknown unit \"{word}\""))
                 .hint(format!("common units: {COMMON_UNITS}"))
         })?;

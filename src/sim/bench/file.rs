@@ -288,7 +288,7 @@ impl DeviceEntry {
 pub(in crate::sim) fn value_in(text: &str, own: Unit) -> Option<f64> {
     let (number, unit) =
         text.split_at(text.find(|letter: char| !"+-.0123456789".contains(letter)).unwrap_or(text.len()));
-    let unit = if unit.is_empty() { own } else { Unit::from_symbol(unit.trim())? };
+    let unit = if unit.is_empty() { own } else { Unit::from_symbol(unit.trim())?.beside(own) };
     unit.convert(number.parse().ok()?, own)
 }
 

@@ -45,6 +45,7 @@ impl Limits {
             Limit::Value(value, None) => (value, None),
             Limit::Value(value, Some(from)) => {
                 let to = unit?;
+                let from = from.beside(to);
                 // The limit is a difference, not a point on the scale.
                 (from.convert(value, to)? - from.convert(0.0, to)?, None)
             }

@@ -162,7 +162,8 @@ impl Check<'_> {
             }
             let value = |name: &str| document.get(&format!("signal.{}.{name}", signal.name)).map(|entry| &entry.value);
             if let Some(Item::Text(text)) = value("unit") {
-                (scale.unit, scale.is_in_file) = (Unit::from_symbol(text).or(scale.unit), true);
+                let unit = Unit::from_symbol(text).map(|unit| signal.unit.map_or(unit, |present| unit.beside(present)));
+                (scale.unit, scale.is_in_file) = (unit.or(scale.unit), true);
             }
             if let Some(Item::Integer(digits)) = value("digits") {
                 scale.digits = u8::try_from(*digits).ok().filter(|digits| *digits <= 9).or(scale.digits);

@@ -65,6 +65,7 @@ fn is_same_range(entry: &Entry, found: &Range) -> bool {
     let Item::Text(text) = &entry.value else { return false };
     let Some((start, end, unit)) = range(text) else { return false };
     let present = found.unit.unwrap_or(Unit::NONE);
+    let unit = unit.beside(present);
     let convert = |number: f64| if unit == present { Some(number) } else { unit.convert(number, present) };
     let own_start = found.start.map(|start| start.as_f64());
     let own_end = found.end.as_f64();

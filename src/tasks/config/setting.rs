@@ -39,8 +39,8 @@ pub enum Form {
     Hex,
     /// A duration; the step of the object is this many microseconds.
     Duration(u32),
-    /// A unit: `"bar"`.
-    Unit,
+    /// A unit: `"bar"`, of the signal with this number.
+    Unit(Option<usize>),
     /// A number in the unit of the signal with this number.
     Quantity(usize, Scale),
     /// A word for some of the numbers.
@@ -245,7 +245,7 @@ impl Catalog<'_> {
         let entries = self.node.model.as_ref().map_or(&[][..], |model| &model.description.objects);
         let is_unit = entries.iter().any(|other| other.unit_at == Some(entry.object));
         let form = match (signal, tick) {
-            _ if is_unit => Form::Unit,
+            _ if is_unit => Form::Unit(None),
             (Some(signal), _) => Form::Quantity(signal, Scale::Point),
             (None, Some(tick)) if matches!(entry.data_type, DataType::Unsigned(1..=4)) => Form::Duration(tick),
             _ => Form::Plain,
@@ -286,7 +286,7 @@ impl Catalog<'_> {
         let is_zero = autozero.into_iter().any(|zero| zero.offset == Some(entry.object));
         let name = if is_zero { "offset" } else { name };
         let form = match entry.object.index & 0x0fff {
-            0x131 => Form::Unit,
+            0x131 => Form::Unit(Some(at)),
             0x114 => Form::Duration(1),
             0x1a0 => Form::Words(filter_words(self.node, signal)),
             0x121 | 0x123 | 0x134 | 0x135 | 0x148 | 0x149 => Form::Quantity(at, Scale::Point),

@@ -75,7 +75,9 @@ impl Setting {
         match &self.form {
             Form::Hex => text(format!("0x{number:X}")),
             Form::Duration(tick) => text(duration(number, *tick)),
-            Form::Unit => text(u32::try_from(number).map_or_else(|_| number.to_string(), |code| unit_text(Unit(code)))),
+            Form::Unit(_) => {
+                text(u32::try_from(number).map_or_else(|_| number.to_string(), |code| unit_text(Unit(code))))
+            }
             Form::Words(words) => match words.iter().find(|(code, _)| *code == number) {
                 Some((_, word)) => text(word.clone()),
                 None => Item::Integer(number.into()),
@@ -137,11 +139,12 @@ impl Setting {
                 let Item::Text(text) = item else { return Err(wrong("a duration in quotes (\"100ms\")")) };
                 self.integer(counts(text, *tick)?).map(Some)
             }
-            Form::Unit => {
+            Form::Unit(signal) => {
                 let Item::Text(text) = item else { return Err(wrong("a unit in quotes (\"bar\")")) };
                 let unit = Unit::from_symbol(text).filter(|_| !text.is_empty());
                 let unit = unit.ok_or_else(|| Problem::UnknownUnit { text: text.clone() })?;
-                self.integer(unit.0.into()).map(Some)
+                let present = signal.and_then(|signal| node.signals.get(signal)?.unit);
+                self.integer(present.map_or(unit, |present| unit.beside(present)).0.into()).map(Some)
             }
             Form::Words(words) => self.read_word(words, item).map(Some),
             Form::Transmission(timer) => self.integer(transmission(item, *timer)?.into()).map(Some),
@@ -233,8 +236,9 @@ impl Setting {
             return if is_bare { Err(Problem::NoUnit) } else { Ok(None) };
         };
         let (number, is_converted) = match unit {
-            Some(unit) if unit == present => (written, false),
+            Some(unit) if unit.beside(present) == present => (written, false),
             Some(unit) => {
+                let unit = unit.beside(present);
                 let zeros = if scale == Scale::Point { 1.0 } else { 0.0 };
                 let number = unit.convert_with_zeros(written, present, zeros);
                 (number.ok_or(Problem::OtherQuantity { from: unit, to: present })?, true)

@@ -119,6 +119,7 @@ pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit:
     let Some(old) = unit_of(node, &signal) else {
         return Err(Failure::at(node.id, SettingsFailure::NoUnit { signal: Some(signal.name) }));
     };
+    let unit = unit.beside(old.unit);
     if old.unit == unit {
         let fact = SettingsFact::AlreadyInUnit { signal: signal.name, unit };
         let notes = vec![Note::of_node(node.id, fact)];
@@ -181,7 +182,7 @@ pub fn list(units: &[Unit]) -> String {
 
 /// Whether the unit of a signal has the same quantity.
 pub fn is_alike(signal: &Signal, unit: Unit) -> bool {
-    signal.unit.is_some_and(|present| present.convert(0.0, unit).is_some())
+    signal.unit.is_some_and(|present| present.convert(0.0, unit.beside(present)).is_some())
 }
 
 /// The signal with this name; without a name the only signal with a unit of the same quantity.
