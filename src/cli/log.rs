@@ -140,7 +140,7 @@ impl Log {
     fn record(&self, global: &Global, files: &mut OpenFiles) -> anyhow::Result<Finished> {
         // Rows and live lines cannot share a terminal.
         let is_shared = global.progress == When::Auto && files.rows.is_none() && io::stdout().is_terminal();
-        let progress = Progress::new(global.shows_progress() && !is_shared, self.duration.map(|d| d.0), self.count);
+        let progress = Progress::new(global.shows_progress() && !is_shared, global.console().color);
         let console = Console { progress: Some(progress.multi()), ..global.console() };
         let (report, verdicts, mut recorder) = global.with_claims(|master, claims| {
             let is_live = master.bus().is_live();
@@ -154,6 +154,8 @@ impl Log {
             let mut recorder =
                 Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
             // Without --poll, the nodes are free for other processes as soon as the recording runs.
+            recorder.counts.duration = self.duration.map(|duration| duration.0);
+            recorder.counts.count = self.count;
             recorder.plot = self.plot.then(|| Recording::new(TimeBase::Clock));
             recorder.claims = self.poll.is_none().then(|| std::mem::take(claims));
             let mut checker = Checker::new(&self.expect, &options.nodes, true, &mut recorder);

@@ -39,6 +39,11 @@ impl IntervalTracker {
         gap
     }
 
+    /// The usual interval; `None` before the second message.
+    pub fn usual(&self) -> Option<Duration> {
+        self.usual
+    }
+
     /// Whether a message was received so far.
     pub fn has_received(&self) -> bool {
         self.last.is_some()

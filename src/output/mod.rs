@@ -23,6 +23,7 @@ mod info_report;
 pub mod interfaces;
 pub mod json;
 pub mod junit;
+pub mod live;
 pub mod lss;
 pub mod monitor;
 pub mod nmt;

@@ -1,12 +1,19 @@
 //! The live lines of a recording: the latest values of each node, and the progress.
 
-use super::text;
+use super::live::{LiveCounts, LiveTable};
+use super::stderr_size;
+use crate::bus::Mono;
 use crate::measure::sample::{Sample, Source};
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use anstream::adapter::strip_str;
+use anstream::{AutoStream, ColorChoice};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 use std::cell::Cell;
-use std::collections::BTreeMap;
 use std::io::{self, Write};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
+
+/// The shortest time over which rows a second are counted.
+const SECOND: Duration = Duration::from_secs(1);
 
 /// Redraws per second.
 pub(super) const REDRAWS_PER_SECOND: u8 = 10;
@@ -15,29 +22,31 @@ pub(super) const REDRAWS_PER_SECOND: u8 = 10;
 #[derive(Debug)]
 pub struct Progress {
     multi: MultiProgress,
-    nodes: BTreeMap<u8, (ProgressBar, BTreeMap<usize, String>)>,
-    total: ProgressBar,
-    duration: Option<Duration>,
-    count: Option<u64>,
-    changed: bool,
+    /// All lines in one, so that they are drawn together.
+    lines: ProgressBar,
+    table: LiveTable,
+    color: bool,
+    /// The width of the terminal and the lengths of the lines at the last redraw.
+    drawn: (usize, Vec<usize>),
+    /// The time and the rows at the start of the present second.
+    second: (Duration, u64),
+    rows_per_second: f64,
 }
 
 impl Progress {
     /// Live lines, hidden unless `show`.
-    pub fn new(show: bool, duration: Option<Duration>, count: Option<u64>) -> Progress {
-        let target =
-            if show { ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_SECOND) } else { ProgressDrawTarget::hidden() };
-        let multi = MultiProgress::with_draw_target(target);
-        let total = match (count, duration) {
-            (Some(count), _) => bar(&multi, count),
-            (None, Some(duration)) => bar(&multi, u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)),
-            (None, None) => {
-                let line = multi.add(ProgressBar::new_spinner());
-                line.set_style(style("{msg}"));
-                line
-            }
+    pub fn new(show: bool, color: ColorChoice) -> Progress {
+        let target = match stderr_size().filter(|_| show) {
+            Some(_) => ProgressDrawTarget::term_like_with_hz(Box::new(Screen::default()), REDRAWS_PER_SECOND),
+            None => ProgressDrawTarget::hidden(),
         };
-        Progress { multi, nodes: BTreeMap::new(), total, duration, count, changed: false }
+        let multi = MultiProgress::with_draw_target(target);
+        let lines = multi.add(ProgressBar::new_spinner());
+        lines.set_style(style("{msg}"));
+        let has_color = |choice| choice != ColorChoice::Never;
+        let color = has_color(color) && has_color(AutoStream::choice(&io::stderr())) || color == ColorChoice::Always;
+        let (table, drawn) = (LiveTable::default(), (0, Vec::new()));
+        Progress { multi, lines, table, color, drawn, second: (Duration::ZERO, 0), rows_per_second: 0.0 }
     }
 
     /// Returns the [`MultiProgress`]: the console prints its lines between the redraws.
@@ -56,47 +65,33 @@ impl Progress {
             return;
         }
         for sample in samples {
-            let Some(source) = sources.get(sample.source) else { continue };
-            let (_, values) = self.nodes.entry(source.node.get()).or_insert_with(|| {
-                let line = self.multi.insert_before(&self.total, ProgressBar::new_spinner());
-                line.set_style(style("{prefix:<4} {msg}"));
-                line.set_prefix(source.node.to_string());
-                (line, BTreeMap::new())
-            });
-            let value = sample.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
-            let status = sample.status.map_or("", |status| status.as_str());
-            values.insert(sample.source, format!("{} {value} {} {status}", source.signal, source.unit));
-            self.changed = true;
+            if let Some(source) = sources.get(sample.source) {
+                self.table.update(sample, source);
+            }
         }
     }
 
     /// Redraws.
-    pub fn tick(&mut self, elapsed: Duration, rows: u64) {
+    pub fn tick(&mut self, now: Mono, counts: LiveCounts) {
         if self.is_hidden() {
             return;
         }
-        if std::mem::take(&mut self.changed) {
-            for (line, values) in self.nodes.values() {
-                let all: Vec<&str> = values.values().map(|value| value.trim_end()).collect();
-                line.set_message(all.join("   "));
-            }
+        let passed = counts.elapsed.saturating_sub(self.second.0);
+        if passed >= SECOND {
+            self.rows_per_second = counts.rows.saturating_sub(self.second.1) as f64 / passed.as_secs_f64();
+            self.second = (counts.elapsed, counts.rows);
         }
-        let counted = format!("{} rows", text::grouped(rows));
-        match (self.count, self.duration) {
-            (Some(count), _) => {
-                self.total.set_position(rows.min(count));
-                self.total.set_message(counted);
-            }
-            (None, Some(duration)) => {
-                self.total.set_position(u64::try_from(elapsed.as_millis()).unwrap_or(u64::MAX));
-                let left = Duration::from_secs(duration.saturating_sub(elapsed).as_secs());
-                self.total.set_message(format!("{} left   {counted}", humantime::format_duration(left)));
-            }
-            (None, None) => {
-                let spent = Duration::from_secs(elapsed.as_secs());
-                self.total.set_message(format!("{}   {counted}   Ctrl-C ends", humantime::format_duration(spent)));
-            }
+        let size = stderr_size().unwrap_or((80, 24));
+        let counts = LiveCounts { rows_per_second: self.rows_per_second, ..counts };
+        let text = self.table.lines(&counts, now, size, self.color);
+        let lengths = strip_str(&text).to_string().lines().map(|line| line.chars().count()).collect();
+        let (width, before) = std::mem::replace(&mut self.drawn, (size.0, lengths));
+        let wrapped: usize = before.iter().map(|length| length.saturating_sub(1) / size.0.max(1)).sum();
+        if size.0 < width && wrapped > 0 {
+            // The narrower terminal has wrapped the lines. If it is closed, there is nothing to draw.
+            let _ = write!(io::stderr(), "\x1b[{wrapped}A\r\x1b[J");
         }
+        self.lines.set_message(text);
     }
 
     /// Removes the lines. After Ctrl-C they stay: the terminal has printed `^C`, so the position of the cursor is
@@ -109,6 +104,89 @@ impl Progress {
             let _ = self.multi.clear();
         }
         self.multi.set_draw_target(ProgressDrawTarget::hidden());
+    }
+}
+
+/// The terminal on stderr. Lines end with a line end and not with spaces up to the edge, so that a terminal of another
+/// width does not join them.
+#[derive(Debug, Default)]
+struct Screen {
+    output: Mutex<ScreenOutput>,
+}
+
+#[derive(Debug, Default)]
+struct ScreenOutput {
+    text: String,
+    /// Whether the next text is on the next line.
+    is_line_full: bool,
+}
+
+impl Screen {
+    fn put(&self, text: &str) -> io::Result<()> {
+        let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
+        // indicatif fills each line with spaces.
+        if !text.is_empty() && text.bytes().all(|byte| byte == b' ') {
+            output.text.push_str("\x1b[K");
+            output.is_line_full = true;
+            return Ok(());
+        }
+        if std::mem::take(&mut output.is_line_full) {
+            output.text.push_str("\r\n");
+        }
+        output.text.push_str(text);
+        Ok(())
+    }
+
+    fn command(&self, count: usize, letter: char) -> io::Result<()> {
+        if count > 0 { self.put(&format!("\x1b[{count}{letter}")) } else { Ok(()) }
+    }
+}
+
+impl TermLike for Screen {
+    fn width(&self) -> u16 {
+        stderr_size().map_or(80, |(width, _)| u16::try_from(width).unwrap_or(u16::MAX))
+    }
+
+    fn height(&self) -> u16 {
+        stderr_size().map_or(24, |(_, height)| u16::try_from(height).unwrap_or(u16::MAX))
+    }
+
+    fn move_cursor_up(&self, count: usize) -> io::Result<()> {
+        self.command(count, 'A')
+    }
+
+    fn move_cursor_down(&self, count: usize) -> io::Result<()> {
+        self.command(count, 'B')
+    }
+
+    fn move_cursor_right(&self, count: usize) -> io::Result<()> {
+        self.command(count, 'C')
+    }
+
+    fn move_cursor_left(&self, count: usize) -> io::Result<()> {
+        self.command(count, 'D')
+    }
+
+    fn write_line(&self, text: &str) -> io::Result<()> {
+        self.put(&format!("{text}\r\n"))
+    }
+
+    fn write_str(&self, text: &str) -> io::Result<()> {
+        self.put(text)
+    }
+
+    fn clear_line(&self) -> io::Result<()> {
+        self.put("\r\x1b[K")
+    }
+
+    fn flush(&self) -> io::Result<()> {
+        let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
+        output.is_line_full = false;
+        let text = std::mem::take(&mut output.text);
+        // Until the program knows that the terminal is narrower, lines are cut and not wrapped.
+        let mut err = io::stderr();
+        write!(err, "\x1b[?7l{text}\x1b[?7h")?;
+        err.flush()
     }
 }
 
@@ -162,4 +240,19 @@ pub(super) fn bar(multi: &MultiProgress, length: u64) -> ProgressBar {
 /// The style of a line.
 pub(super) fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_end_without_spaces() {
+        let screen = Screen::default();
+        for text in ["first", "   ", "second", " "] {
+            screen.put(text).expect("memory");
+        }
+        let output = screen.output.into_inner().expect("not poisoned");
+        assert_eq!((output.text.as_str(), output.is_line_full), ("first\x1b[K\r\nsecond\x1b[K", true));
+    }
 }

@@ -8,6 +8,7 @@ use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
 use crate::output::events::{EventText, Events, Weight, event_text, file_change_text};
 use crate::output::failure::ErrorMessage;
+use crate::output::live::LiveCounts;
 use crate::output::progress::Progress;
 use crate::output::recording::Recording;
 use crate::output::rows::{FileChange, Rows};
@@ -36,6 +37,10 @@ pub(super) struct Recorder {
     pub(super) error: Option<Unwritten>,
     /// The values and events for `--plot`.
     pub(super) plot: Option<Recording>,
+    /// The counts for the live view.
+    pub(super) counts: LiveCounts,
+    /// Frames that the kernel dropped.
+    dropped: u64,
     /// The name of the file of the rows.
     file: String,
     /// The nodes that no other cangauge may use until the recording runs.
@@ -64,6 +69,8 @@ impl Recorder {
             console,
             error: None,
             plot: None,
+            counts: LiveCounts { file: file.clone(), ..LiveCounts::default() },
+            dropped: 0,
             claims: None,
             file,
             start: None,
@@ -195,13 +202,21 @@ impl Observer for Recorder {
         {
             self.error.get_or_insert(Unwritten::Rows(error));
         }
+        match event {
+            LogEvent::Gap(..) => self.counts.gaps += 1,
+            LogEvent::Dropped(count) => self.dropped += u64::from(*count),
+            _ => {}
+        }
         self.put_event(&event_text(event), at);
     }
 
     fn tick(&mut self, at: Stamp, _rows: u64) -> ControlFlow<()> {
         self.claims = None;
         let start = *self.start.get_or_insert(at.mono);
-        self.progress.tick(at.mono.since(start), self.rows.count());
+        self.counts.elapsed = at.mono.since(start);
+        self.counts.rows = self.rows.count();
+        self.counts.lost = self.rows.overflowed() + self.dropped;
+        self.progress.tick(at.mono, self.counts.clone());
         let result = self.rows.advance(at);
         if self.rows.count() > 0 {
             self.check_rows(at);
