@@ -6,6 +6,7 @@ use super::slcan::Slcan;
 use super::socketcand::Client;
 use super::stream::StreamBus;
 use super::{Bus, BusError, Mode};
+use crate::canopen::id::bit_rate;
 use std::fmt;
 
 /// The TCP port of socketcand.
@@ -139,24 +140,6 @@ fn slcan(text: &str) -> Result<(Place, u32), String> {
         }
     };
     Ok((place, rate))
-}
-
-/// The bit rates of classic CAN, in bit/s.
-const RATES: std::ops::RangeInclusive<u32> = 1_000..=1_000_000;
-
-/// A bit rate of CAN in bit/s: `250k`, `1M`, `125000`.
-///
-/// # Errors
-/// The text is not a bit rate.
-pub fn bit_rate(text: &str) -> Result<u32, String> {
-    let (number, factor) = match text.strip_suffix(['k', 'K']) {
-        Some(number) => (number, 1_000),
-        None => text.strip_suffix('M').map_or((text, 1), |number| (number, 1_000_000)),
-    };
-    let digits = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-    let rate = number.parse::<u32>().ok().filter(|_| digits).and_then(|number| number.checked_mul(factor));
-    rate.filter(|rate| RATES.contains(rate))
-        .ok_or_else(|| format!("\"{text}\" is not a CAN bit rate (250k, 1M, 125000)"))
 }
 
 #[cfg(test)]

@@ -174,6 +174,24 @@ impl fmt::Display for CanId {
     }
 }
 
+/// The bit rates of classic CAN, in bit/s.
+const BIT_RATES: std::ops::RangeInclusive<u32> = 1_000..=1_000_000;
+
+/// A bit rate of CAN in bit/s: `250k`, `1M`, `125000`.
+///
+/// # Errors
+/// The text is not a bit rate.
+pub fn bit_rate(text: &str) -> Result<u32, String> {
+    let (number, factor) = match text.strip_suffix(['k', 'K']) {
+        Some(number) => (number, 1_000),
+        None => text.strip_suffix('M').map_or((text, 1), |number| (number, 1_000_000)),
+    };
+    let digits = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    let rate = number.parse::<u32>().ok().filter(|_| digits).and_then(|number| number.checked_mul(factor));
+    rate.filter(|rate| BIT_RATES.contains(rate))
+        .ok_or_else(|| format!("\"{text}\" is not a CAN bit rate (250k, 1M, 125000)"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,8 +1,8 @@
 //! Types of arguments: nodes, signals, objects, durations. Arguments are checked here, before a bus is opened.
 
 use crate::bus::claim::Claim;
-use crate::bus::remote::{Remote, bit_rate};
-use crate::canopen::id::{CanId, NodeId, parse_u32};
+use crate::bus::remote::Remote;
+use crate::canopen::id::{CanId, NodeId, bit_rate, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::measure::decode::Wanted;

@@ -2,8 +2,7 @@
 
 use super::problem::Problem;
 use super::setting::{Form, Scale, Setting};
-use crate::bus::remote::bit_rate;
-use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::id::{CanId, NodeId, bit_rate};
 use crate::canopen::pdo::{MappingEntry, Transmission};
 use crate::canopen::value::{DataType, Value};
 use crate::device::config_file::Item;
