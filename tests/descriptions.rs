@@ -283,7 +283,7 @@ fn writable_objects_accept_allowed_values_only() {
     }
 }
 
-/// Numbers between those that are listed.
+/// Numbers between the listed ones.
 fn gaps(described: &ObjectEntry) -> impl Iterator<Item = f64> {
     let listed = listed(described);
     let free = |number: &f64| !listed.iter().any(|(low, high)| low <= number && number <= high);

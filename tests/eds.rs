@@ -622,7 +622,7 @@ fn spelling_of_the_file_is_a_name() {
     assert_eq!(types, [DataType::Integer(2), DataType::Integer(2), DataType::Unsigned(8)].map(Some));
 }
 
-/// The names in a file with their objects, read by other means than those of the program.
+/// The names in a file with their objects, read without the parser of the program.
 fn names_in(text: &str) -> Vec<(ObjectId, String)> {
     let mut object = None;
     let mut names = Vec::new();

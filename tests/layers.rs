@@ -1,5 +1,5 @@
-//! Checks the structure of `src`: which layer may use which, what only some layers may do, and the size of files
-//! and functions.
+//! Checks the structure of `src`: the allowed uses between layers, the functions that only some layers may call, and
+//! the size of files and functions.
 //!
 //! The tests parse the code with `syn`. Comments and items under `#[cfg(test)]` do not count.
 
@@ -10,7 +10,7 @@ use code::{Source, folder, sources};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
-/// The layers and the layers that each may use. The list in `src/lib.rs` says the same.
+/// The layers and the layers that each may use. The list in `src/lib.rs` must be equal.
 const ARROWS: &[(&str, &[&str])] = &[
     ("bus", &["canopen"]),
     ("canopen", &[]),
@@ -152,7 +152,7 @@ fn is_part_of(path: &str, whole: &str) -> bool {
     path.strip_prefix(whole).is_some_and(|rest| rest.is_empty() || rest.starts_with("::"))
 }
 
-/// Uses inside the crate that follow no arrow.
+/// Uses inside the crate that no arrow allows.
 fn forbidden_uses(source: &Source) -> Vec<String> {
     let layer = source.layer();
     let allowed = ARROWS.iter().find(|(name, _)| *name == layer).map_or(&[][..], |(_, targets)| targets);
@@ -302,7 +302,7 @@ fn text_waits_and_writes_have_one_place_each() {
     assert_none(&places.collect::<Vec<_>>());
 }
 
-/// The checks find what they are meant to find.
+/// The checks find violations.
 #[test]
 fn violations_are_found() {
     let found = |file: &str, text: &str| -> Vec<String> {

@@ -1,4 +1,4 @@
-"""Several nodes: missing ones, ones that answer in part, two with one node-ID."""
+"""Several nodes: missing nodes, nodes that answer only some requests, two nodes with one node-ID."""
 
 import os
 
@@ -7,7 +7,7 @@ from table import case
 
 
 class Pair(Device):
-    """A second device beside this one, in a process of its own."""
+    """A second device in a separate process."""
 
     def __init__(self, interface, node):
         super().__init__(interface, node)

@@ -1,4 +1,4 @@
-"""Why nothing arrives, lost nodes, heartbeats and TPDOs that differ from the standard."""
+"""Silent devices, lost nodes, and heartbeats and TPDOs that differ from the standard."""
 
 from device import OPERATIONAL, PRE_OPERATIONAL, STOPPED, Device, sint, uint
 from table import case
@@ -117,7 +117,7 @@ class HeartbeatOfTwoBytes(LongHeartbeat):
 
 @case("scan --passive", 3, never="(?m)^ *5 ")
 class EmptyFrames(LongHeartbeat):
-    """Frames of 0 bytes in place of heartbeats are no sign of life."""
+    """Frames of 0 bytes in place of heartbeats do not count as heartbeats."""
 
     def heartbeat(self):
         self.send(0x700 + self.node)

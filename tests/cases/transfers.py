@@ -6,7 +6,7 @@ from device import OPERATIONAL, PRE_OPERATIONAL, STOPPED, Device, sint, uint
 from table import case
 
 
-# One optional object that does not answer stops nothing.
+# A command continues if an optional object does not answer.
 
 class Without(Device):
     """Does not answer reads of some objects."""
@@ -79,7 +79,7 @@ class IndexZeroWithoutEffect(IndexZero):
 
 @case("sdo read 5 0x1017", 3, err="585#4B17100[1F]")
 class OtherSubIndex(Device):
-    """Answers with sub-index 1 in place of 0."""
+    """Answers with sub-index 1 instead of 0."""
 
     def upload(self, key, value):
         super().upload((key[0], key[1] or 1) if key[0] == 0x1017 else key, value)

@@ -1,4 +1,4 @@
-"""Devices whose values are easily taken for others: unknown types, narrow integers, wrong lengths, overloads."""
+"""Devices whose values are easily misread: unknown types, narrow integers, wrong lengths, overloads."""
 
 from device import Device, real, sint, uint
 from table import case

@@ -559,7 +559,7 @@ fn a_failed_apply_is_rolled_back_from_its_journal() {
     let failed = run("config apply 1 f.toml").exit(4);
     assert!(failed.stderr.contains("written: node.heartbeat, node.emcy-inhibit-time"), "{}", failed.stderr);
     assert!(failed.stderr.contains("go back: cangauge config apply 1 --rollback"), "{}", failed.stderr);
-    // The simulated device forgets what was written: it starts with it.
+    // Each command starts a new simulated device: the bench contains the written values.
     let set =
         "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x1017\" = 500, \"0x1015\" = 100 }\n";
     std::fs::write(bench.path("bench.toml"), set).expect("a file");

@@ -11,7 +11,7 @@ use std::thread;
 const TOO_LONG: [&str; 1] = ["cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv"];
 
 /// The lines of the help and the README that start with the name of the program, without the explanation beside them.
-/// A command that is to fail (`||`) is tested with the README.
+/// A command that must fail (`||`) is tested with the README.
 fn examples() -> BTreeSet<String> {
     let mut texts =
         vec![std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("the README")];

@@ -1,4 +1,4 @@
-//! Commands for several nodes never lose one. Node 1 works, node 5 answers 1000h and nothing else, node 9 is absent.
+//! Commands for several nodes report each node. Node 1 works, node 5 answers only 1000h, node 9 is absent.
 
 use super::Bench;
 

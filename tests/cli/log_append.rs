@@ -14,7 +14,7 @@ fn second_run_continues_the_file() {
     bench.run("log 127 --count 2 -o run.csv --append --summary sum.json --append").exit(2);
     bench.run("log 127 --count 2 -o run.csv --append --summary sum.json").exit(0);
     let both = bench.text("run.csv");
-    let rest = both.strip_prefix(&first).expect("what was there stays");
+    let rest = both.strip_prefix(&first).expect("the old content stays");
     assert_eq!(rest.lines().count(), 2);
     // elapsed_s counts from the first row of its run.
     assert_eq!(rest.lines().next().and_then(|line| line.split(',').nth(1)), Some("0.000000"));

@@ -223,7 +223,7 @@ fn values_by_address_are_read_as_the_signal() {
     assert_eq!(rows(&log.stdout, 1), ["0x9130:1,1.307,bar,"]);
     // The number as sent: with its type.
     scaled.run("read 5 0x9130:1/i32").prints("1307\n");
-    // An integer where CiA 404 has a REAL32.
+    // An integer instead of the REAL32 of CiA 404.
     let integer = bench_of(&[("0x6130:1", "i32", "ro", "12345")], &["0x61300120"]);
     check(&integer, "5", "0x6130:1 < 1").exit(1);
     // The status object says that the value is not valid.

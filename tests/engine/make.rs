@@ -116,8 +116,8 @@ fn device(random: &mut Random, at: u32) -> DeviceSpec {
         heartbeat_ms: random.percent(45).then(|| *random.pick(&[50, 100, 200, 1000])),
         bit_rate: random.percent(2).then(|| *random.pick(&RATES)),
         latency_us,
-        // The answer to this write must have come before the program starts, which could not distinguish it from an
-        // answer to its own requests. So a device that hangs or is late gets none.
+        // The program cannot distinguish the answer to this write from an answer to its own requests. So the answer
+        // must arrive before the program starts, and a slow device gets no write.
         unsaved_heartbeat: (latency_us < 20_000 && random.percent(15)).then_some(150),
         event_timer_ms: random.percent(30).then(|| *random.pick(&[10, 50, 100])),
         overload: random.percent(10),

@@ -65,7 +65,7 @@ pub(crate) enum Mute {
 }
 
 impl Mute {
-    /// What the failure of `log` must contain.
+    /// The text that the failure of `log` must contain.
     pub(crate) fn reason(self) -> &'static str {
         match self {
             Mute::Disabled => "(bit 31 of 1800h:1)",

@@ -65,7 +65,7 @@ def receive(network, tpdo, sync):
                 network.sync.transmit()
         tpdo.receive_condition.wait(TIMEOUT)
         if not tpdo.is_received:
-            raise RuntimeError(f"{tpdo.name}: nothing came")
+            raise RuntimeError(f"{tpdo.name}: no TPDO received")
         return [entry.raw for entry in tpdo.map]
 
 

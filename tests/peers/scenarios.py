@@ -64,10 +64,10 @@ class TestBed:
         with open(os.path.join(directory, "simulator"), "w") as err:
             process = subprocess.Popen([self.binary, "--bus", self.there, "sim", bench], stderr=err, stdin=subprocess.DEVNULL)
         expected = sum(bool(device["node"]) for device in scenario.devices)
-        came = self.probe.boot_ups(expected)
-        if len(came) != expected:
+        booted = self.probe.boot_ups(expected)
+        if len(booted) != expected:
             process.kill()
-            raise RuntimeError(f"boot-ups only of {came}: {open(err.name).read()}")
+            raise RuntimeError(f"boot-ups only of {booted}: {open(err.name).read()}")
         return process
 
     def read_devices(self, scenario):

@@ -95,7 +95,7 @@ fn text(snapshot: &Snapshot) -> String {
     String::from_utf8(text).expect("text")
 }
 
-/// The dump without `[calibration]` and what differs between devices of one kind.
+/// The dump without `[calibration]` and without the values that differ between devices of one kind.
 fn dump(bus: &mut dyn Bus, number: u8) -> String {
     let text = text(&snapshot(bus, number).expect("read"));
     let text = text.split("\n[calibration]").next().unwrap_or_default().to_owned();
@@ -172,7 +172,8 @@ fn a_replacement_gets_all_settings_except_the_calibration() {
     }
 }
 
-/// A fault at every write, three of seven kinds in turn: success is the state of the device, and a second run ends in the wanted state.
+/// A fault at every write, three of seven kinds in turn. After a reported success the device has the wanted state.
+/// After a failure the second run reaches it.
 #[test]
 fn an_interrupted_apply_is_completed_by_the_next_one() {
     let refusal = Fault::Refuse(0x0800_0000);
@@ -187,29 +188,29 @@ fn an_interrupted_apply_is_completed_by_the_next_one() {
         assert!(writes.len() > 3, "{device}");
         for (turn, at) in writes.into_iter().enumerate() {
             for fault in faults.into_iter().chain([away]).cycle().skip(3 * turn).take(3) {
-                let told = format!("{device} {fault:?} at {at}: {}", clean.sent[at]);
+                let case = format!("{device} {fault:?} at {at}: {}", clean.sent[at]);
                 let mut faulty = FaultyBus::new(bus(device), fault, at);
                 let result = set(&mut faulty, NODE, file, &Options::default());
                 let mut bus = faulty.bus;
-                // The device boots, and answers that were late arrive.
+                // The device boots, and late answers arrive.
                 let until = Mono::at(bus.now().mono.since_start() + Duration::from_secs(3));
                 while bus.receive(until).expect("the bus works") != Event::Timeout {}
                 match &result {
-                    Ok(_) => assert_eq!(dump(&mut bus, NODE), wanted, "{told}: reported as done"),
+                    Ok(_) => assert_eq!(dump(&mut bus, NODE), wanted, "{case}: reported as done"),
                     Err(failure) => {
-                        assert_ne!(failure.kind(), Kind::Usage, "{told}");
-                        assert!(!ErrorMessage::of(failure).message.is_empty(), "{told}");
+                        assert_ne!(failure.kind(), Kind::Usage, "{case}");
+                        assert!(!ErrorMessage::of(failure).message.is_empty(), "{case}");
                     }
                 }
-                set(&mut bus, NODE, file, &Options::default()).unwrap_or_else(|failure| panic!("{told}: {failure}"));
-                assert_eq!(dump(&mut bus, NODE), wanted, "{told}");
+                set(&mut bus, NODE, file, &Options::default()).unwrap_or_else(|failure| panic!("{case}: {failure}"));
+                assert_eq!(dump(&mut bus, NODE), wanted, "{case}");
             }
         }
     }
 }
 
-/// The program is killed before each frame that changes the device. The next run ends in the wanted state, and a
-/// rollback in the old one.
+/// The program is killed before each frame that changes the device. The next run reaches the wanted state, and a
+/// rollback the old one.
 #[test]
 fn a_killed_apply_is_completed_or_rolled_back() {
     // A range is a condition, not a setting. The conversion to another unit and back may round it.
@@ -227,26 +228,26 @@ fn a_killed_apply_is_completed_or_rolled_back() {
             // The frames before the store are those of the run without a store.
             let stores = |frame: &Frame| frame.data().starts_with(&[0x23, 0x10, 0x10]);
             for (at, frame) in frames.skip_while(|(_, frame)| options.store && !stores(frame)) {
-                let told = format!("{device} killed before {at}: {frame}");
+                let case = format!("{device} killed before {at}: {frame}");
                 // The MH-4 has every kind of setting. The other devices alternate.
                 for rolls_back in [false, true].into_iter().filter(|back| device == "mh4" || *back == (at % 2 == 0)) {
                     let mut journal = Kept::default();
                     let mut killed = FaultyBus::new(bus(device), Fault::Gone, at);
-                    set_with(&mut killed, NODE, file, &options, &mut journal).expect_err(&told);
+                    set_with(&mut killed, NODE, file, &options, &mut journal).expect_err(&case);
                     let mut bus = killed.bus;
                     if rolls_back {
-                        let before = journal.0.clone().unwrap_or_else(|| panic!("{told}: no journal"));
+                        let before = journal.0.clone().unwrap_or_else(|| panic!("{case}: no journal"));
                         let sections = Sections { address: false, calibration: true };
                         let options = Options { sections, ..options.clone() };
                         set_with(&mut bus, NODE, &before, &options, &mut journal)
-                            .unwrap_or_else(|failure| panic!("{told}: rollback: {failure}"));
-                        assert_eq!(settings(&mut bus), old, "{told}");
+                            .unwrap_or_else(|failure| panic!("{case}: rollback: {failure}"));
+                        assert_eq!(settings(&mut bus), old, "{case}");
                     } else {
                         set_with(&mut bus, NODE, file, &options, &mut journal)
-                            .unwrap_or_else(|failure| panic!("{told}: again: {failure}"));
-                        assert_eq!(settings(&mut bus), wanted, "{told}");
+                            .unwrap_or_else(|failure| panic!("{case}: again: {failure}"));
+                        assert_eq!(settings(&mut bus), wanted, "{case}");
                     }
-                    assert_eq!(journal.0, None, "{told}: the journal is removed after success");
+                    assert_eq!(journal.0, None, "{case}: the journal is removed after success");
                 }
             }
         }
@@ -268,8 +269,7 @@ fn an_address_is_set_last_and_confirmed() {
     }
 }
 
-/// Devices are plugged in one after the other: the new one is found, one that was there before is not, and two at once
-/// are both reported.
+/// Devices are connected one after the other. Only the new device is found. Two new devices are both reported.
 #[test]
 fn devices_that_are_plugged_in_are_found_one_by_one() {
     let mut bus = bus("d20");

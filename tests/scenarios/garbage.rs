@@ -22,7 +22,7 @@ const TPDOS: [(u16, usize); 8] =
     [(0x181, 5), (0x281, 5), (0x182, 4), (0x183, 8), (0x283, 8), (0x383, 8), (0x483, 8), (0x1ff, 4)];
 
 /// Another station that sends meaningless frames. It sends no NMT command, SYNC, boot-up or SDO request:
-/// these change what the devices do.
+/// these would change the devices or their state.
 struct GarbageSender {
     frames: std::iter::Cycle<std::vec::IntoIter<Frame>>,
     next: Mono,

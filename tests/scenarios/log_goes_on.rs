@@ -194,7 +194,8 @@ fn restarted_node_is_started_again() {
     assert!(after > 20, "rows continue: {after}");
 }
 
-/// The command that returns the node to its previous state is lost: once it is sent again, twice it is reported.
+/// The command that returns the node to its previous state is lost. After the first loss it is sent again; the second
+/// loss is reported.
 #[test]
 fn lost_return_to_the_previous_state_is_noticed() {
     let run = |lost: &[u64]| {

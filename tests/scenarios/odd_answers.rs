@@ -68,7 +68,7 @@ fn with_mute<T>(kind: &str, silent: &[u16], work: impl FnOnce(&mut Master<'_>) -
     work(&mut Master::new(&mut bus, Timing::default()))
 }
 
-/// What follows one request: the start of the request, and the answers to it.
+/// The start of a request, and the answers to it.
 type Step = (&'static str, &'static [&'static str]);
 
 /// A server that answers by a list. A step is used once, except the last one for a request.

@@ -1,4 +1,4 @@
-"""Disturbs the program: kills, stops, full disks, two writers, rotations by others, clock steps, held claims.
+"""Disturbs the program: kills, stops, full disks, two writers, rotations by others, clock steps, held locks.
 
     STRESS_SECONDS=60 STRESS_SEED=1 tests/socketcan/vcan -t 300 python3 tests/socketcan/stress.py BINARY vcan0
 
@@ -39,7 +39,7 @@ class Stress:
         self.counts, self.failures = collections.Counter(), []
 
     def start(self):
-        """How long several commands need to start on this machine now."""
+        """The present start time of several commands on this machine."""
         started = time.monotonic()
         subprocess.run([self.binary, "devices"], stdout=subprocess.DEVNULL, check=True)
         return 10 * (time.monotonic() - started)
@@ -50,7 +50,7 @@ class Stress:
 
     def end(self, process, limit, *exits):
         """Waits for the end of a command, not longer than `limit` seconds, one more, and the time of a start."""
-        for seconds in (limit + 1, 0):  # Once more, in case that this machine has become slow.
+        for seconds in (limit + 1, 0):  # The machine may have become slow: measure again.
             with contextlib.suppress(subprocess.TimeoutExpired):
                 out, err = process.communicate(timeout=seconds + self.start())
                 break
@@ -107,7 +107,7 @@ class Stress:
         self.check(again[len(rows):], path)
 
     def stops(self, path):
-        """The program is stopped and continued. It ends in time, and receives what the kernel kept."""
+        """The program is stopped and continued. It ends in time, and receives the frames that the kernel kept."""
         process = self.log(path, "--duration", "2s")
         time.sleep(self.start() / 5)
         for _ in range(self.rng.randint(1, 4)):
@@ -173,8 +173,8 @@ class Stress:
         self.end(process, 3, 0)
         self.check(rows_of(path)[0], path)
 
-    def held_claim(self, _):
-        """A neighbour holds the claim and accepts nothing. SIGTERM ends the wait; `--ignore-lock` does not wait."""
+    def held_lock(self, _):
+        """Another process holds the lock and accepts no connection. SIGTERM ends the wait, `--ignore-lock` skips it."""
         with socket.socket(socket.AF_UNIX) as holder:
             holder.bind(f"\0cangauge/{self.interface}/{self.rng.choice(['6', 'all'])}")
             holder.listen(self.rng.choice([0, 1]))
@@ -194,7 +194,7 @@ class Stress:
         assert out == "700\n", out + err
 
     def killed_apply(self, path):
-        """`config apply` is killed. `--rollback` restores what the device held."""
+        """`config apply` is killed. `--rollback` restores the old values of the device."""
         before, _ = self.run("config", "dump", 6, limit=20)
         for name, text in ((path, SETTINGS), (f"{path}.old", before)):
             with open(name, "w", encoding="utf-8") as file:
@@ -251,7 +251,7 @@ def main():
         simulator.stderr.readline()
         until = time.monotonic() + float(os.environ.get("STRESS_SECONDS", 60))
         recordings = [stress.signals, stress.stops, stress.full_disk, stress.two_writers, stress.rotation]
-        others = [stress.held_claim, stress.killed_probe, stress.killed_apply]
+        others = [stress.held_lock, stress.killed_probe, stress.killed_apply]
         threads = [threading.Thread(target=stress.work, args=(kinds, until)) for kinds in (recordings, others)]
         for act in (threading.Thread.start, threading.Thread.join):
             for thread in threads:

@@ -52,7 +52,7 @@ pub(super) fn after_power(spec: &Spec, run: &mut Run, violations: &mut Vec<Viola
             let own = |holds: &DeviceState| (holds.stored, holds.node.filter(|_| run.killed.is_none()));
             let before = run.before.iter().map(own);
             if spec.command.is_lss() && !before.eq(after.iter().map(own)) {
-                violations.push(("reports what was changed", format!("{failure}: {:?} became {after:?}", run.before)));
+                violations.push(("reports its changes", format!("{failure}: {:?} became {after:?}", run.before)));
             }
         }
         _ => {}

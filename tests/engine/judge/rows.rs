@@ -58,7 +58,7 @@ pub(super) fn rows(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
                 return;
             }
             None => {
-                violations.push(("shows what was sent", format!("{row} (sent: {sent:?})")));
+                violations.push(("shows sent values", format!("{row} (sent: {sent:?})")));
                 return;
             }
         }
@@ -79,7 +79,7 @@ pub(super) fn rows(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     }
 }
 
-/// Whether a row shows what was sent. A device that was not recognised has the names of its profile or its objects, and
+/// Whether a row shows a sent value. A device that was not recognised has the names of its profile or its objects, and
 /// an unknown value or unit is empty.
 fn agrees(spec: &Spec, row: &str, truth: &str) -> bool {
     let [row, truth] = [row, truth].map(|line| line.split(',').collect::<Vec<_>>());

@@ -28,7 +28,7 @@ pub(super) fn check_cause(spec: &Spec, run: &Run, violations: &mut Vec<Violation
     if stopped || failure.kind() == Kind::Usage || ErrorMessage::of(failure).message.contains("nothing was changed") {
         let changes = (0..run.bus.frames.len()).find_map(|place| taken(&run.bus.frames[place..]));
         if let Some((at, frame)) = changes {
-            violations.push(("reports what was changed", format!("{failure}, and {frame} at {:?}", at.since_start())));
+            violations.push(("reports its changes", format!("{failure}, and {frame} at {:?}", at.since_start())));
         }
     }
 }
@@ -74,7 +74,7 @@ fn begins(frame: &Frame) -> Option<ObjectId> {
 fn was_silent(spec: &Spec, run: &Run, failure: &Failure, violations: &mut Vec<Violation>) {
     let (Some(node), Some(object)) = (failure.node, failure.object) else { return };
     let message = ErrorMessage::of(failure).message;
-    // The set-up of a recording has a limit for all transfers together: the last one may not have begun.
+    // The set-up of a recording has a limit for all transfers together: the last one may not have started.
     if message.contains("in the middle") || message.contains("not finished within") {
         return;
     }

@@ -23,14 +23,14 @@ pub(super) fn watched(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
                 let is_silent =
                     |(came, node, _): &(Mono, NodeId, Life)| *node == seen.node && *came > at - silent && *came <= at;
                 if silent < Duration::from_millis(50) || lives.iter().any(is_silent) {
-                    violations.push(("reports what was received", format!("{seen:?} of {lives:?}")));
+                    violations.push(("reports received changes", format!("{seen:?} of {lives:?}")));
                 }
                 continue;
             }
         };
         match left.iter().position(|came| *came == (at, seen.node, life)) {
             Some(place) => drop(left.remove(place)),
-            None => violations.push(("reports what was received", format!("{seen:?} of {lives:?}"))),
+            None => violations.push(("reports received changes", format!("{seen:?} of {lives:?}"))),
         }
     }
     if run.result.is_err() {
@@ -47,7 +47,7 @@ pub(super) fn watched(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
         };
         let is_told = run.observed.seen.iter().any(|seen| seen.node == *node && seen.at.mono == *at);
         if is_news && !is_told {
-            violations.push(("reports what was received", format!("nothing of {life:?} of node {node} at {at:?}")));
+            violations.push(("reports received changes", format!("nothing of {life:?} of node {node} at {at:?}")));
             return;
         }
     }

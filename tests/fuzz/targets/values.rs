@@ -39,7 +39,7 @@ fuzz_target!(|data: &[u8]| {
             if exact && !times.contains(name) {
                 assert_eq!(data_type.encode_text(&text).as_deref(), Ok(rest), "{name}: {text}");
             } else if !matches!(value, Value::Text(_)) && !is_nan(&value) && is_canonical(&value) {
-                let again = data_type.encode_text(&text).expect("what is printed can be typed");
+                let again = data_type.encode_text(&text).expect("printed text can be parsed");
                 assert_eq!(data_type.decode(&again).expect("its width"), value, "{name}: {text}");
             }
         }

@@ -100,13 +100,13 @@ class Probe:
         return self.boot_ups(count)
 
     def boot_ups(self, count):
-        came = []
+        booted = []
         for identifier, data in self.frames(TIMEOUT if count else 0.3):
             if identifier & 0x780 == 0x700 and data == b"\x00":
-                came.append(identifier & 0x7F)
-                if len(came) == count:
+                booted.append(identifier & 0x7F)
+                if len(booted) == count:
                     break
-        return came
+        return booted
 
     def configuring(self):
         """Whether a device is in LSS configuration state, so that it answers inquiries."""

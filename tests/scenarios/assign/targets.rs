@@ -144,7 +144,7 @@ impl Station for OtherMaster {
 
 #[test]
 fn traffic_of_another_master_is_no_second_device() {
-    // Its answers alone (its requests came before) prove nothing; its requests are reported.
+    // Its answers alone (its requests were sent before) prove nothing; its requests are reported.
     for (frames, expected) in [
         (&["585#4B17100000000000"][..], None),
         (&["585#4300200012345678", "585#0000000000000000"], None),
