@@ -15,8 +15,9 @@ use cangauge::node::survey::{identify, survey_each};
 use cangauge::node::{self, Node, Overrides, write};
 use cangauge::sim::{Device, Setup};
 use cangauge::tasks::log::{LogOptions, Mode, log};
+use cangauge::tasks::pdo::show;
 use cangauge::tasks::read::{Readings, read as read_signals};
-use cangauge::tasks::{Failure, Kind};
+use cangauge::tasks::{Failure, Kind, settings};
 use std::time::Duration;
 
 const NAME: ObjectId = ObjectId::new(0x1008, 0);
@@ -27,12 +28,13 @@ const HEARTBEAT: ObjectId = ObjectId::new(0x1017, 0);
 pub(super) struct Mute {
     device: Device,
     silent: Vec<u16>,
+    silent_object: Option<ObjectId>,
 }
 
 impl Mute {
     pub(super) fn new(kind: &str, silent: &[u16]) -> Mute {
         let device = Device::new(Setup::new(by_name(kind).expect("a kind"), node())).expect("a device");
-        Mute { device, silent: silent.to_vec() }
+        Mute { device, silent: silent.to_vec(), silent_object: None }
     }
 }
 
@@ -44,6 +46,7 @@ impl Station for Mute {
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
         match *frame.data() {
             [0x40, low, high, ..] if self.silent.contains(&u16::from_le_bytes([low, high])) => {}
+            [0x40, a, b, c, ..] if self.silent_object == Some(ObjectId::from_multiplexer([a, b, c])) => {}
             _ => self.device.receive(now, frame, out),
         }
     }
@@ -345,6 +348,34 @@ fn silent_status_object_does_not_slow_polling_down() {
         assert!(kept.rows.len() > 75 * signals, "{kind}: {}", kept.rows.len());
         assert!(kept.rows.iter().all(|row| !row.contains(",ok,")), "{kind}: {:?}", kept.rows);
     }
+}
+
+#[test]
+fn pages_show_the_objects_that_answer() {
+    // No built-in description has 1800h:3, which is read in the same way.
+    let timer = ObjectId::new(0x1800, 5);
+    for kind in ["mh4", "dps"] {
+        let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
+        bus.attach(Mute { silent_object: Some(timer), ..Mute::new(kind, &[]) });
+        let mut master = Master::new(&mut bus, Timing::default());
+        let tpdos = show(&mut master, node(), None, &Overrides::new()).expect("the others answer");
+        assert!(!tpdos[0].settings.mapping.is_empty() && tpdos[0].settings.event_timer_ms.is_none(), "{kind}");
+        assert_eq!(master.unknown_objects()[&node()], [timer], "{kind}");
+    }
+    for (silent, register) in [(0x1003, Some(0)), (0x1001, None)] {
+        with_mute("mh4", &[silent], |master| {
+            let device = settings::open(master, node(), &Overrides::new()).expect("answers");
+            let errors = settings::errors::read(master, &device).expect("the other object answers");
+            assert_eq!((errors.register, errors.count.is_some()), (register, silent == 0x1001));
+            assert_eq!(master.unknown_objects()[&node()], [ObjectId::new(silent, 0)]);
+            assert!(settings::info::read(master, &device).is_ok());
+        });
+    }
+    with_mute("dps", &[0x1001, 0x1003], |master| {
+        let device = settings::open(master, node(), &Overrides::new()).expect("answers");
+        let failure = settings::errors::read(master, &device).expect_err("neither answers");
+        assert_eq!(failure.kind(), Kind::NoAnswer);
+    });
 }
 
 #[test]

@@ -20,11 +20,13 @@ pub(super) struct Session<'a, 'bus> {
     pub(super) has_restarted: bool,
     /// The number of writes that the node carried out.
     pub(super) writes: u32,
+    /// Whether optional objects may be silent. They are then recorded as unknown.
+    pub(super) accepts_silence: bool,
 }
 
 impl<'a, 'bus> Session<'a, 'bus> {
     pub(super) fn new(master: &'a mut Master<'bus>, node: &'a Node) -> Session<'a, 'bus> {
-        Session { master, node, has_restarted: false, writes: 0 }
+        Session { master, node, has_restarted: false, writes: 0, accepts_silence: false }
     }
 
     fn error(&self, object: ObjectId, operation: Operation, failure: SdoFailure) -> SdoError {

@@ -41,8 +41,8 @@ impl Settings {
     ) -> Result<Settings, StepError> {
         let cob_id = session.read(number.communication(1), 4)?;
         let transmission = session.read(number.communication(2), 1)?;
-        let inhibit_100us = if inhibit { optional(session.read(number.communication(3), 2))? } else { None };
-        let event_timer_ms = optional(session.read(number.communication(5), 2))?;
+        let inhibit_100us = if inhibit { optional(session, number.communication(3))? } else { None };
+        let event_timer_ms = optional(session, number.communication(5))?;
         let count = u8::try_from(session.read(number.mapping(0), 1)?).unwrap_or(u8::MAX);
         let multiplexed = count > MAX_ENTRIES;
         let entries = if multiplexed { 0 } else { count };
@@ -85,13 +85,19 @@ impl Settings {
 }
 
 /// The number; `None` for an object that the device does not have.
-fn optional(result: Result<u32, StepError>) -> Result<Option<u16>, StepError> {
-    match result {
+fn optional(session: &mut Session<'_, '_>, object: ObjectId) -> Result<Option<u16>, StepError> {
+    match session.read(object, 2) {
         Ok(number) => Ok(u16::try_from(number).ok()),
         Err(StepError::Rejected(SdoError {
             failure: SdoFailure::Refused(AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX),
             ..
         })) => Ok(None),
+        Err(StepError::Lost(SdoError { node, failure: SdoFailure::NoAnswer { .. }, .. }))
+            if session.accepts_silence =>
+        {
+            session.master.add_unknown(node, object);
+            Ok(None)
+        }
         Err(error) => Err(error),
     }
 }

@@ -86,7 +86,7 @@ pub fn show(
     if wanted.is_empty() {
         return Err(Failure::at(node.id, PdoFailure::NoTpdo));
     }
-    let mut session = Session::new(master, &node);
+    let mut session = Session { accepts_silence: true, ..Session::new(master, &node) };
     let read = |number| {
         let settings = Settings::read(&mut session, number, may_have_inhibit_time(&node, number));
         let settings = settings.map_err(|error| not_read(node.id, available.clone(), error))?;

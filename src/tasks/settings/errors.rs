@@ -8,8 +8,10 @@ use crate::canopen::value::Value;
 use crate::device::description::{EmergencyEntry, ErrorHistory};
 use crate::master::Master;
 use crate::node::Node;
+use crate::node::read::Reader;
 use crate::node::write::write;
 use crate::tasks::Failure;
+use std::collections::BTreeMap;
 
 const REGISTER: ObjectId = ObjectId::new(0x1001, 0);
 const HISTORY: ObjectId = ObjectId::new(0x1003, 0);
@@ -71,22 +73,21 @@ pub struct PastError {
 /// # Errors
 /// No answer; [`SettingsFailure::NoErrorObjects`].
 pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Errors, Failure> {
-    let mut number = |object: ObjectId| -> Result<Option<u64>, Failure> {
-        if !node.may_have(object) {
-            return Ok(None);
-        }
-        Ok(read_each(master, node, &[object])?.first().and_then(Option::as_ref).and_then(Value::as_u64))
-    };
-    let (register, count) = (number(REGISTER)?, number(HISTORY)?);
+    let present: Vec<ObjectId> = [REGISTER, HISTORY].into_iter().filter(|&object| node.may_have(object)).collect();
+    let found = present.iter().copied().zip(values(master, node, &present)?);
+    let found: BTreeMap<ObjectId, u64> = found.filter_map(|(object, value)| Some((object, value?.as_u64()?))).collect();
+    let (register, count) = (found.get(&REGISTER).copied(), found.get(&HISTORY).copied());
     let register = register.and_then(|bits| u8::try_from(bits).ok());
     if register.is_none() && count.is_none() {
+        // Without an answer, it is unknown whether the node has them.
+        read_each(master, node, &present)?;
         return Err(Failure::at(node.id, SettingsFailure::NoErrorObjects));
     }
     // CiA 301 allows 254 entries.
     let entries = count.and_then(|count| u8::try_from(count).ok()).unwrap_or(0).min(254);
     let objects: Vec<ObjectId> =
         (1..=entries).map(|sub| HISTORY.with_sub(sub)).filter(|&object| node.may_have(object)).collect();
-    let history = read_each(master, node, &objects)?;
+    let history = values(master, node, &objects)?;
     let history = history.iter().flatten().filter_map(Value::as_u64).filter_map(|raw| u32::try_from(raw).ok());
     Ok(Errors {
         register,
@@ -97,9 +98,15 @@ pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Errors, Failure> {
     })
 }
 
+/// The values of optional objects. Those without a valid answer are recorded as unknown.
+fn values(master: &mut Master<'_>, node: &Node, objects: &[ObjectId]) -> Result<Vec<Option<Value>>, Failure> {
+    let items: Vec<_> = objects.iter().map(|&object| (node.id, object, node.data_type(object))).collect();
+    Ok(Reader::new(master).values(&items)?)
+}
+
 fn counters(master: &mut Master<'_>, node: &Node) -> Result<Vec<ErrorCounter>, Failure> {
     let objects = node.model.as_ref().map_or(&[][..], |model| &model.description.error_counters);
-    let values = read_each(master, node, objects)?;
+    let values = values(master, node, objects)?;
     let counter = |(&object, value): (&ObjectId, &Option<Value>)| ErrorCounter {
         object,
         name: node.name_of(object),
