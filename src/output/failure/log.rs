@@ -44,7 +44,7 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         LogFailure::TwoSenders(number) => {
             Words::new(two_senders(*number)).hint("disconnect one of them, or change its node-ID: cangauge lss scan")
         }
-        LogFailure::Replaced => Words::new("another device has replaced it: its rows are in a new file"),
+        LogFailure::Replaced => Words::new("another device has replaced it (with -o, its rows are in a new file)"),
         LogFailure::UnknownMapping => unknown_mapping(failure),
         LogFailure::OtherLength { mapped, received, is_live } => other_length(failure, *mapped, *received, *is_live),
         LogFailure::NothingReceived { within, nodes, has_traffic, interface } => {
