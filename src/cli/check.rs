@@ -16,12 +16,15 @@ use crate::output::check_progress::CheckProgress;
 use crate::output::console::Console;
 use crate::output::events::{event_text, remark_text};
 use crate::output::failure::ErrorMessage;
-use crate::output::{junit, verdict};
+use crate::output::{github, junit, verdict};
 use crate::tasks::check::{CheckOptions, CheckReport, all_satisfied, check, check_figures};
 use crate::tasks::health::{self, HealthOptions};
 use crate::tasks::log::{LogEvent, Mode, Observer};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
+use std::env;
+use std::fs::OpenOptions;
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Duration as StdDuration;
@@ -70,6 +73,16 @@ pub(crate) struct Check {
     /// replaced
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
+    /// Print an annotation per expression and node to stderr, and append a table to the file in GITHUB_STEP_SUMMARY
+    /// [default: github if GITHUB_ACTIONS is true]
+    #[arg(long, value_name = "SERVER")]
+    annotate: Option<Annotate>,
+}
+
+/// The servers with annotations.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Annotate {
+    Github,
 }
 
 impl Check {
@@ -86,21 +99,18 @@ impl Check {
         let waited = file.as_ref().map_or(StdDuration::ZERO, |file| file.waited);
         let report = match self.measure(global, waited) {
             // A CI server also needs a report if nothing was measured.
-            Err(error) if file.is_some() => {
+            Err(error) => {
                 let failure = error.downcast_ref::<Failure>().filter(|failure| failure.kind() != Kind::Usage);
-                if let (Some(failure), Some(file)) = (failure, file) {
-                    let report = CheckReport::not_measured(&self.expressions, failure.clone());
-                    file.write(junit::document(&report).as_bytes())?;
+                if let Some(failure) = failure {
+                    self.deliver(global, file, &CheckReport::not_measured(&self.expressions, failure.clone()))?;
                 }
                 return Err(error);
             }
-            result => result?,
+            Ok(report) => report,
         };
         let console = global.console();
         report.remarks.iter().for_each(|remark| console.note(&remark_text(remark)));
-        if let Some(file) = file {
-            file.write(junit::document(&report).as_bytes())?;
-        }
+        self.deliver(global, file, &report)?;
         global.print(&verdict::rows(&report))?;
         match all_satisfied(&report.verdicts, &report.failures) {
             Err(failure) if failure.kind() != Kind::CheckFailed && report.is_partial() => {
@@ -109,6 +119,24 @@ impl Check {
             }
             result => Ok(result?),
         }
+    }
+
+    /// Writes the reports for CI servers.
+    fn deliver(&self, global: &Global, file: Option<ReportFile>, report: &CheckReport) -> anyhow::Result<()> {
+        // Errors as JSON stay alone on stderr, unless annotations are requested.
+        let is_automatic =
+            || env::var_os("GITHUB_ACTIONS").is_some_and(|value| value == "true") && !global.console().json;
+        if self.annotate.is_some() || is_automatic() {
+            let console = global.console();
+            github::annotations(report).iter().for_each(|line| console.plain(line));
+            if let Some(path) = env::var_os("GITHUB_STEP_SUMMARY").filter(|path| !path.is_empty()) {
+                let opened = OpenOptions::new().append(true).create(true).open(&path);
+                if let Err(error) = opened.and_then(|mut file| file.write_all(github::summary(report).as_bytes())) {
+                    console.warn(&format!("no step summary: {}: {error}", path.display()));
+                }
+            }
+        }
+        file.map_or(Ok(()), |file| file.write(junit::document(report).as_bytes()))
     }
 
     /// Checks the arguments that need no bus.

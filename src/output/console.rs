@@ -43,6 +43,11 @@ impl Console {
         }
     }
 
+    /// Prints a line for another program, also with `-q`.
+    pub fn plain(&self, line: &str) {
+        self.line(Style::new(), "", line);
+    }
+
     /// Draws a plot.
     pub fn plot(&self, plot: &Plot) {
         let mut err = anstream::AutoStream::new(io::stderr(), self.color);

@@ -16,6 +16,7 @@ pub mod draft;
 mod elapsed;
 pub mod events;
 pub mod failure;
+pub mod github;
 pub mod health;
 pub mod identity;
 pub mod info;

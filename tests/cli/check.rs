@@ -272,6 +272,35 @@ fn junit_reports() {
     assert_eq!(bench.files(), ["report.xml", "silent.xml"]);
 }
 
+#[test]
+fn github_annotations_and_step_summary() {
+    let bench = constant();
+    let words = ["check", "5", "pressure < 1 bar", "temperature > 20 degC", "-q"];
+    let run = |words: &[&str], variables: &[(&str, &str)]| {
+        let mut command = bench.traced(words);
+        command.envs(variables.iter().copied());
+        bench.finish(&mut command)
+    };
+    let lines = "::error title=cangauge check node 5::pressure < 1 bar: 1.25 bar\n\
+                 ::notice title=cangauge check node 5::temperature > 20 degC: 25.5 degC\n";
+    let error = "cangauge: 1 of 2 checks failed: node 5: pressure < 1 bar: 1.25 bar\n";
+    assert_eq!(run(&words, &[("GITHUB_ACTIONS", "false")]).exit(1).stderr, error);
+    let done = run(&words, &[("GITHUB_ACTIONS", "true"), ("GITHUB_STEP_SUMMARY", "summary.md")]).exit(1);
+    assert_eq!(done.stderr, [lines, error].concat());
+    let row =
+        "| **FAIL** | 5 | pressure &#60; 1 bar | 1.25 bar |\n| ok | 5 | temperature &#62; 20 degC | 25.5 degC |\n";
+    assert!(bench.text("summary.md").contains(row), "{}", bench.text("summary.md"));
+    // Without an answer, too; the table of another step stays.
+    let silent = ["check", "9", "pressure < 1 bar", "--annotate", "github"];
+    let done = run(&silent, &[("GITHUB_STEP_SUMMARY", "summary.md")]).exit(3);
+    assert!(
+        done.stderr.starts_with("::error title=cangauge check node 9::pressure < 1 bar: no data: "),
+        "{}",
+        done.stderr
+    );
+    assert!(bench.text("summary.md").contains(row) && bench.text("summary.md").contains("| **no data** | 9 |"));
+}
+
 fn timestamp(report: &str) -> &str {
     report.split("timestamp=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("a timestamp")
 }
