@@ -104,7 +104,10 @@ pub fn ahead_of_utc(at: i64) -> i64 {
     let mut fields: libc::tm = unsafe { std::mem::zeroed() };
     // SAFETY: `localtime_r` reads and writes only the values that it is given.
     let is_known = unsafe { !libc::localtime_r(&raw const seconds, &raw mut fields).is_null() };
-    if is_known { i64::from(fields.tm_gmtoff) * 1_000_000 } else { 0 }
+    // It has another type on some systems.
+    #[allow(clippy::useless_conversion)]
+    let seconds = i64::from(fields.tm_gmtoff);
+    if is_known { seconds * 1_000_000 } else { 0 }
 }
 
 /// Time zones are unknown on this system.

@@ -166,6 +166,6 @@ fn nodes_are_not_started_beside_another_nmt_master() {
         let note = format!("not started, because another NMT master sent {sent}: node 5; start all nodes: log --start");
         assert_eq!(beside(frame, mode, false), (vec![note], Some(State::PreOperational), false), "{frame}");
     }
-    assert_eq!(beside("000#0109", sync, true).2, true, "--start");
+    assert!(beside("000#0109", sync, true).2, "--start");
     assert_eq!(beside("000#01", sync, false), (Vec::new(), Some(State::Operational), true), "not a command");
 }

@@ -56,7 +56,7 @@ impl TimeAxis {
         let (minute, hour) = (seconds.div_euclid(60), seconds.div_euclid(3600));
         let time = match step {
             ..1_000 => format!("{:02}:{:02}.{part:06}", minute.rem_euclid(60), seconds.rem_euclid(60)),
-            ..SECOND => format!("{:02}:{:02}.{:03}", minute.rem_euclid(60), seconds.rem_euclid(60), part / 1000),
+            1_000..SECOND => format!("{:02}:{:02}.{:03}", minute.rem_euclid(60), seconds.rem_euclid(60), part / 1000),
             _ if self.is_clock() && step % (60 * SECOND) == 0 => {
                 format!("{:02}:{:02}", hour.rem_euclid(24), minute.rem_euclid(60))
             }
@@ -137,10 +137,9 @@ pub(super) fn value_ticks((low, high): (f64, f64), most: usize) -> Vec<(f64, Str
         let value = if value.abs() < step / 2.0 { 0.0 } else { value };
         match magnitude {
             ..-6.0 => format!("{value:.3e}"),
-            ..0.0 => format!(
-                "{value:.*}",
-                (1..=6).find(|digits| f64::from(*digits) >= -magnitude).map_or(6, |digits| digits as usize)
-            ),
+            ..0.0 => {
+                format!("{value:.*}", (1..=6u8).find(|digits| f64::from(*digits) >= -magnitude).map_or(6, usize::from))
+            }
             _ if value.abs() >= 1e9 => format!("{value:.3e}"),
             _ => format!("{value:.0}"),
         }

@@ -35,7 +35,7 @@ impl Reduced {
 /// The connected parts of a curve. `x` is the column of a time. A gap or a missing value is shown only if it is as wide
 /// as a column.
 pub(super) fn paths(points: &[Point], x: impl Fn(i64) -> f64) -> Vec<Vec<(f64, f64)>> {
-    let (mut paths, mut path, mut open): (Vec<Vec<(f64, f64)>>, Vec<(f64, f64)>, Option<Reduced>) = Default::default();
+    let (mut paths, mut path, mut open) = (Vec::new(), Vec::new(), None::<Reduced>);
     let mut is_broken = false;
     for point in points {
         if !point.value.is_finite() {

@@ -88,6 +88,7 @@ impl Image {
             for y in y0..y1 {
                 for x in x0..x1 {
                     let distance = distance((x as f64 + 0.5, y as f64 + 0.5), from, to);
+                    #[allow(clippy::cast_possible_truncation)]
                     let share = (radius + 0.5 - distance).clamp(0.0, 1.0) as f32;
                     let kept = &mut shares[(y - top) * across + x - left];
                     *kept = kept.max(share);

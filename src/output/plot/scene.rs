@@ -89,6 +89,12 @@ impl Frame {
     }
 }
 
+/// A number without its fraction. Negative numbers become 0.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn whole(number: f64) -> usize {
+    number as usize
+}
+
 /// Makes a text fit into a number of characters.
 pub(super) fn shortened(text: &str, most: usize) -> String {
     let text = crate::output::text::safe(text);
@@ -103,14 +109,14 @@ impl Scene {
         let mut scene = Scene { title: plot.title.clone(), width: WIDTH, height: 0.0, shapes: Vec::new() };
         let height = HEIGHTS[plot.panels.len().min(HEIGHTS.len()) - 1];
         let ticks: Vec<Vec<(f64, String)>> =
-            plot.panels.iter().map(|panel| value_ticks(panel.range, (height / 45.0) as usize)).collect();
+            plot.panels.iter().map(|panel| value_ticks(panel.range, whole(height / 45.0))).collect();
         let widest = ticks.iter().flatten().map(|(_, label)| label.len()).max().unwrap_or(0);
         let left = EDGE + widest as f64 * CHARACTER + 8.0;
         let labels = plot.panels.iter().filter(|panel| panel.curves.len() > 1).flat_map(|panel| &panel.curves);
         let label = labels.map(|curve| shortened(&curve.label, MAX_LABEL).chars().count()).max();
         let beside = label.map_or(2.0 * EDGE, |label| LEADER + SAMPLE + 6.0 + label as f64 * CHARACTER + EDGE);
         let mut top = EDGE + LINE;
-        scene.text((left, top - 4.0), Anchor::Start, &shortened(&plot.title, ((WIDTH - left) / CHARACTER) as usize));
+        scene.text((left, top - 4.0), Anchor::Start, &shortened(&plot.title, whole((WIDTH - left) / CHARACTER)));
         if !plot.events.is_empty() {
             top += LINE;
         }
