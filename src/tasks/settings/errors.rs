@@ -73,6 +73,13 @@ pub struct PastError {
 /// # Errors
 /// No answer; [`SettingsFailure::NoErrorObjects`].
 pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Errors, Failure> {
+    read_by(values, master, node)
+}
+
+/// Reads values of a node: [`values`], or [`read_each`], which fails without an answer.
+type ReadValues = fn(&mut Master<'_>, &Node, &[ObjectId]) -> Result<Vec<Option<Value>>, Failure>;
+
+fn read_by(values: ReadValues, master: &mut Master<'_>, node: &Node) -> Result<Errors, Failure> {
     let present: Vec<ObjectId> = [REGISTER, HISTORY].into_iter().filter(|&object| node.may_have(object)).collect();
     let found = present.iter().copied().zip(values(master, node, &present)?);
     let found: BTreeMap<ObjectId, u64> = found.filter_map(|(object, value)| Some((object, value?.as_u64()?))).collect();
@@ -158,13 +165,13 @@ fn detail(entry: &EmergencyEntry, bytes: [u8; 2]) -> String {
 /// # Errors
 /// The device has no history, rejects the write, does not answer, or keeps its history.
 pub fn clear(master: &mut Master<'_>, node: &Node) -> Result<(Errors, Errors), Failure> {
-    let before = read(master, node)?;
+    let before = read_by(read_each, master, node)?;
     let Some(count) = before.count else {
         return Err(Failure::at(node.id, SettingsFailure::NoErrorHistory));
     };
     let width = node.data_type(HISTORY).width().unwrap_or(1).min(4);
     write(master, node, HISTORY, &[0; 4][..width])?;
-    let now = read(master, node)?;
+    let now = read_by(read_each, master, node)?;
     let left = now.count.unwrap_or(0);
     // If there are fewer or different errors, they are new.
     let are_new = left < count || now.history != before.history;
