@@ -83,7 +83,8 @@ impl MissedAnswers {
         self.time_without_answer += time;
     }
 
-    /// Whether a node started a short time ago and has not answered since. Some devices do not answer for 2 to 3 s after their boot-up message.
+    /// Whether a node started a short time ago and has not answered since. Some devices do not answer for 2 to 3 s after
+    /// their boot-up message.
     /// `asked_at` is the time of the first request: further boot-up messages do not extend the time limit.
     pub(super) fn is_starting(&self, node: NodeId, asked_at: Option<Mono>, now: Mono) -> bool {
         let is_recent = |moment: Mono| now.since(moment) < START_TIME;

@@ -74,6 +74,7 @@ mod linux {
 
 #[cfg(all(target_os = "linux", not(without_socketcan)))]
 pub(in crate::cli) use linux::list;
+#[cfg(all(target_os = "linux", not(without_socketcan)))]
 pub(super) use linux::{down, up};
 
 #[cfg(not(all(target_os = "linux", not(without_socketcan))))]
