@@ -8,6 +8,7 @@ use crate::random::Random;
 use crate::spec::{Act, DeviceFault, DeviceSpec, Fault, Kill, Other, Spec};
 use commands::command;
 
+// Without baumer: it is recognised only with --device, so its signals have other names than in the record.
 const KINDS: [&str; 14] = [
     "mh4",
     "mh4",
@@ -20,7 +21,7 @@ const KINDS: [&str; 14] = [
     "dps",
     "hydac",
     "jumo",
-    "baumer",
+    "jumo",
     "hydac-old",
     LARGE_KIND,
 ];
