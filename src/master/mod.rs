@@ -397,8 +397,8 @@ impl<'bus> Master<'bus> {
         self.seen = now;
         self.sdo.advance(&self.timing, now, &mut self.outgoing);
         let (sdo, timing) = (&mut self.sdo, &self.timing);
-        let retry_at = self.outgoing.flush(self.bus, now, timing.timeout, &mut |ticket, sent_at| {
-            sdo.on_sent(ticket, sent_at, timing);
+        let retry_at = self.outgoing.flush(self.bus, now, timing.timeout, &mut |ticket, around| {
+            sdo.on_sent(ticket, around, timing);
         })?;
         Ok(retry_at)
     }

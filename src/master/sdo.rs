@@ -144,12 +144,13 @@ impl SdoClient {
         }
     }
 
-    /// The bus has accepted a frame of a transfer. The time-out starts after the last queued frame.
-    pub(super) fn on_sent(&mut self, ticket: Ticket, now: Mono, timing: &Timing) {
+    /// The bus has accepted a frame of a transfer, between these two moments. The time-out starts after the last queued
+    /// frame. An answer can be older than the second moment, if the program was interrupted after sending.
+    pub(super) fn on_sent(&mut self, ticket: Ticket, [before, now]: [Mono; 2], timing: &Timing) {
         let active = self.nodes.get_mut(&ticket.node).and_then(|node| node.active.as_mut());
         if let Some(active) = active.filter(|active| active.ticket == ticket) {
             active.machine.on_sent();
-            if active.asked_at.replace(active.asked_at.unwrap_or(now)).is_none() {
+            if active.asked_at.replace(active.asked_at.unwrap_or(before)).is_none() {
                 self.missed_answers.on_request(ticket.node, active.request.object);
             }
             active.unsent = active.unsent.saturating_sub(1);

@@ -104,8 +104,8 @@ impl Outgoing {
         self.queue.retain(|(_, ticket)| *ticket != Some(gone));
     }
 
-    /// Sends all frames that can be sent now, and calls `sent` for each frame of a transfer. Returns when to try again
-    /// if frames are left.
+    /// Sends all frames that can be sent now, and calls `sent` for each frame of a transfer, with a moment before and one
+    /// after sending. Returns when to try again if frames are left.
     ///
     /// # Errors
     /// An error of the bus, or a transmit queue that stays full for `queue_timeout` (at least one second). With
@@ -115,7 +115,7 @@ impl Outgoing {
         bus: &mut dyn Bus,
         now: Mono,
         queue_timeout: Duration,
-        sent: &mut dyn FnMut(Ticket, Mono),
+        sent: &mut dyn FnMut(Ticket, [Mono; 2]),
     ) -> Result<Option<Mono>, BusError> {
         if self.queue.len() > MAX_QUEUED_FRAMES as usize && self.bit_rate.is_none() {
             self.bit_rate = Some(bus.bit_rate().filter(|&rate| rate > 0));
@@ -141,7 +141,7 @@ impl Outgoing {
                     }
                     // No node acknowledges. When a node acknowledges again, the waiting frames would be too late.
                     self.first = None;
-                    self.queue.drain(..).filter_map(|(_, ticket)| ticket).for_each(|ticket| sent(ticket, now));
+                    self.queue.drain(..).filter_map(|(_, ticket)| ticket).for_each(|ticket| sent(ticket, [now; 2]));
                     self.full_since = None;
                     return Ok(None);
                 }
@@ -154,7 +154,7 @@ impl Outgoing {
             }
             if let Some(ticket) = ticket {
                 // A bus with several masters lets a frame wait for its turn.
-                sent(*ticket, bus.mono());
+                sent(*ticket, [now, bus.mono()]);
             }
             // Uses the length of this frame. With the longest length, a long burst would be slower than the bus.
             if let Some(bit_rate) = bit_rate {

@@ -10,9 +10,10 @@ use cangauge::bus::{Bus, BusError, Event};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::sdo::DownloadSize;
 use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog;
-use cangauge::master::{Happening, Master, MissedAnswer, SdoError, SdoFailure, Timing};
+use cangauge::master::{Happening, Master, MissedAnswer, OnTwoDevices, Request, SdoError, SdoFailure, Timing};
 use cangauge::sim::Bench;
 use cangauge::tasks::log::{LogOptions, Mode, Remark, log};
 use std::collections::{BTreeMap, VecDeque};
@@ -28,8 +29,12 @@ struct Stalled {
     waiting: VecDeque<Event>,
     /// The user presses Ctrl-C during the stall; the frames have later times than that.
     stopped: bool,
+    /// How long the program does not run after each sent frame.
+    after_send: Duration,
     /// The times at which SYNC was sent.
     syncs: Vec<Mono>,
+    /// The sent frames.
+    sent: Vec<String>,
 }
 
 impl Stalled {
@@ -62,7 +67,13 @@ impl Bus for Stalled {
         if frame.to_string() == "080#" {
             self.syncs.push(self.inner.now().mono);
         }
-        self.inner.send(frame)
+        self.sent.push(frame.to_string());
+        self.inner.send(frame)?;
+        if !self.after_send.is_zero() {
+            self.until = self.inner.now().mono + self.after_send;
+            self.sleep()?;
+        }
+        Ok(())
     }
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
@@ -84,7 +95,8 @@ fn stalled(text: &str, milliseconds: Range<u64>, stopped: bool) -> Stalled {
 fn stall(inner: MemoryBus, milliseconds: Range<u64>, stopped: bool) -> Stalled {
     let at = |milliseconds| Mono::at(Duration::from_millis(milliseconds));
     let (from, until) = (at(milliseconds.start), at(milliseconds.end));
-    Stalled { inner, from, until, waiting: VecDeque::new(), stopped, syncs: Vec::new() }
+    let (waiting, syncs, sent, after_send) = (VecDeque::new(), Vec::new(), Vec::new(), Duration::ZERO);
+    Stalled { inner, from, until, waiting, stopped, after_send, syncs, sent }
 }
 
 fn plan(mode: Mode, duration: Duration) -> LogOptions {
@@ -121,6 +133,25 @@ fn missed_syncs_are_omitted() {
     assert_eq!((outcome.syncs.sent, outcome.rows), (syncs.len() as u64, syncs.len() as u64));
     let omitted = outcome.remarks.iter().filter(|remark| matches!(remark, Remark::SyncsOmittedTooSlow(_)));
     assert_eq!(omitted.count(), 1, "{:?}", outcome.remarks);
+}
+
+#[test]
+fn answer_that_arrives_before_the_clock_is_read_is_used() {
+    let text = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
+    let mut bus = stalled(text, 0..0, false);
+    bus.after_send = Duration::from_millis(30);
+    let node = NodeId::new(5).expect("a node-ID");
+    let mut master = Master::new(&mut bus, Timing::default());
+    master.set_on_two_devices(OnTwoDevices::RefuseWrites);
+    let name = master.read(node, ObjectId::new(0x1008, 0), DataType::VisibleString).expect("the bus works");
+    assert_eq!(name, Ok(Value::Text("MH-4-CAN".into())));
+    let write = Request::write(node, ObjectId::new(0x1017, 0), vec![100, 0], DownloadSize::Indicated);
+    master.transfer_one(write).expect("the bus works").expect("written");
+    assert_eq!(master.second_answers(), []);
+    let initiates: Vec<&str> =
+        bus.sent.iter().map(String::as_str).filter(|frame| frame.starts_with("605#40")).collect();
+    assert_eq!(initiates, ["605#4008100000000000"], "{:?}", bus.sent);
+    assert!(bus.inner.now().mono < Mono::at(Duration::from_secs(1)), "no time-out");
 }
 
 #[test]
