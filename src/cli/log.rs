@@ -153,10 +153,10 @@ impl Log {
             let waits = master.bus().waits();
             let mut recorder =
                 Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
-            // Without --poll, the nodes are free for other processes as soon as the recording runs.
             recorder.counts.duration = self.duration.map(|duration| duration.0);
             recorder.counts.count = self.count;
             recorder.plot = self.plot.then(|| Recording::new(TimeBase::Clock));
+            // Without --poll, the nodes are free for other processes as soon as the recording runs.
             recorder.claims = self.poll.is_none().then(|| std::mem::take(claims));
             let mut checker = Checker::new(&self.expect, &options.nodes, true, &mut recorder);
             let report = log(master, &options, &mut checker);

@@ -9,6 +9,7 @@ use crate::bus::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::multiplexer;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -45,7 +46,7 @@ pub struct SecondAnswer {
 impl SecondAnswer {
     /// The object.
     pub(super) fn object(self) -> Option<ObjectId> {
-        multiplexer(&self.second)
+        multiplexer(self.second.data())
     }
 
     /// Whether the answers differ, so that they come from two devices.
@@ -168,7 +169,7 @@ impl Answers {
 
     /// Handles a frame that does not answer a request. Returns whether it is a second answer.
     pub(super) fn on_unexpected(&mut self, frame: &Frame, at: Mono) -> bool {
-        let object = multiplexer(frame);
+        let object = multiplexer(frame.data());
         if self.may_be_foreign(at) || object.is_some_and(|object| self.repeated.contains(&object)) {
             return false;
         }
@@ -177,7 +178,8 @@ impl Answers {
             return true;
         }
         // The second answer of a slow device may arrive after the answer to a later request.
-        let is_same = |answer: &Frame, operation| multiplexer(answer) == object && answers(frame, operation, answer);
+        let is_same =
+            |answer: &Frame, operation| multiplexer(answer.data()) == object && answers(frame, operation, answer);
         let mut earlier = self.history.iter().rev().map(|&(answer, operation)| (answer, operation));
         let Some((first, _)) = earlier.find(|&(answer, operation)| object.is_some() && is_same(&answer, operation))
         else {
@@ -206,13 +208,6 @@ impl Answers {
             self.wait_until = None;
             self.is_single = true;
         }
-    }
-}
-
-fn multiplexer(frame: &Frame) -> Option<ObjectId> {
-    match frame.data() {
-        [_, a, b, c, ..] => Some(ObjectId::from_multiplexer([*a, *b, *c])),
-        _ => None,
     }
 }
 

@@ -9,7 +9,7 @@ use crate::bus::{Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, Uploaded, Violation, proves_60};
+use crate::canopen::sdo::{AbortCode, Uploaded, Violation, multiplexer, proves_60};
 pub use crate::master::Operation;
 use open::{Open, Step};
 use std::collections::{BTreeSet, VecDeque};
@@ -164,7 +164,7 @@ impl Transfers {
         if let Some(index) = self.position(node, |open| open.expects_segment(Operation::Write) && !is_abort) {
             return self.step(index, received);
         }
-        let object = multiplexer(frame);
+        let object = multiplexer(frame.data());
         match (command >> 5, object) {
             (4, Some(object)) => self.on_abort(node, object, received, true),
             (1 | 2, Some(object)) => self.start(Open::new(node, object, self.answers_60.contains(&node), received)),
@@ -185,7 +185,7 @@ impl Transfers {
         if let Some(index) = self.position(node, |open| open.expects_segment(Operation::Read) && !is_abort) {
             return self.step(index, received);
         }
-        let object = multiplexer(frame);
+        let object = multiplexer(frame.data());
         let is_first = match command >> 5 {
             2 | 3 => true,
             5 => command & 0x03 == 0,
@@ -259,13 +259,5 @@ impl Transfers {
             Step::End(outcome) => self.finish(index, Some(received.at), outcome),
         }
         true
-    }
-}
-
-/// The object in bytes 1 to 3 of a frame.
-fn multiplexer(frame: &Frame) -> Option<ObjectId> {
-    match frame.data() {
-        [_, a, b, c, ..] => Some(ObjectId::from_multiplexer([*a, *b, *c])),
-        _ => None,
     }
 }

@@ -122,8 +122,8 @@ pub fn abort_frame(node: NodeId, object: ObjectId, code: AbortCode) -> Frame {
     Frame::full(CanId::sdo_request(node), [0x80, a, b, c, d, e, f, g])
 }
 
-/// The multiplexer in bytes 1 to 3, if the frame has them.
-fn multiplexer(data: &[u8]) -> Option<ObjectId> {
+/// The object in bytes 1 to 3 of a frame (the multiplexer), if it has them.
+pub fn multiplexer(data: &[u8]) -> Option<ObjectId> {
     match data {
         [_, a, b, c, ..] => Some(ObjectId::from_multiplexer([*a, *b, *c])),
         _ => None,

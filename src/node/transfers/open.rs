@@ -70,7 +70,8 @@ impl Open {
         }
     }
 
-    /// Whether each frame of the sender is now a segment of a block. `operation` tells the sender: the node in a read.
+    /// Whether each frame of the sender is now a segment of a block. In a read the sender is the node, in a write the
+    /// master.
     pub(super) fn expects_segment(&self, operation: Operation) -> bool {
         matches!(&self.state, State::Block(block) if self.operation == operation && block.is_in_segments())
     }
