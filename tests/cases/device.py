@@ -10,6 +10,8 @@ import struct
 import time
 
 REMOTE = 0x40000000
+# The socket module lacks this option of Linux: the time at which the kernel received a frame.
+SO_TIMESTAMPNS = 35
 STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127
 # SDO abort codes.
 TOGGLE, UNKNOWN_COMMAND, NO_OBJECT = 0x05030000, 0x05040001, 0x06020000
@@ -38,7 +40,9 @@ class Device:
 
     def __init__(self, interface, node):
         self.socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        self.socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self.socket.bind((interface,))
+        self.received_at = 0.0  # when the kernel received the last frame
         self.node = node
         self.state = PRE_OPERATIONAL
         self.guard_toggle = 0
@@ -212,5 +216,8 @@ class Device:
                     timer[1]()
             wait = min((due for *_, due in timers), default=now + 60) - time.monotonic()
             if select.select([self.socket], [], [], max(wait, 0))[0]:
-                identifier, length, data = struct.unpack("<IB3x8s", self.socket.recv(16))
+                frame, [(*_, time_received)], *_ = self.socket.recvmsg(16, 64)
+                seconds, nanoseconds = struct.unpack("qq", time_received)
+                self.received_at = seconds + nanoseconds / 1e9
+                identifier, length, data = struct.unpack("<IB3x8s", frame)
                 self.frame(identifier, data[:length])

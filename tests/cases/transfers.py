@@ -239,9 +239,8 @@ class Lss(Device):
 
     def frame(self, identifier, data):
         if identifier == 0x7E5:
-            now, before = time.monotonic(), self.last
-            self.last = now
-            if now - before >= self.pause and self.state in self.states:
+            before, self.last = self.last, self.received_at
+            if self.last - before >= self.pause and self.state in self.states:
                 self.lss(data.ljust(8, b"\0"))
         else:
             super().frame(identifier, data)
