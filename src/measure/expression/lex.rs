@@ -13,6 +13,8 @@ use crate::measure::layout::PARTS;
 pub(super) enum Token {
     /// `9.95`: finite, not negative.
     Number(f64),
+    /// `0x2100`: a number, or the object with this index if the comparison has no other signal.
+    Index(u16),
     /// Text that can only be a signal: `5.pressure`, `pressure.status`, `0x6130:1`.
     Signal(SignalName),
     /// A name, a unit, a function or a keyword.
@@ -148,6 +150,14 @@ fn number_or_signal(text: &str, at: Position) -> Result<(Token, usize), LocatedE
         let what = Wanted::Object(object, stated);
         return Ok((Token::Signal(SignalName { node: None, what, at }), length + type_length));
     }
+    if let Some(index) = index(word) {
+        let (stated, type_length) = stated_type(rest);
+        let what = Wanted::Object(ObjectId::new(index, 0), stated);
+        return Ok(match stated {
+            Some(_) => (Token::Signal(SignalName { node: None, what, at }), word.len() + type_length),
+            None => (Token::Index(index), word.len()),
+        });
+    }
     if let Some(signal) = rest.strip_prefix('.')
         && is_signal(signal)
     {
@@ -157,6 +167,7 @@ fn number_or_signal(text: &str, at: Position) -> Result<(Token, usize), LocatedE
         let (what, length) = match token(signal, inner)? {
             (Token::Signal(named), length) if named.node.is_none() => (named.what, length),
             (Token::Word(name), length) => (Wanted::Signal(name), length),
+            (Token::Index(index), length) => (Wanted::Object(ObjectId::new(index, 0), None), length),
             _ => return Err(LocatedError::new(inner, "expected a signal after the node: 5.pressure")),
         };
         return Ok((Token::Signal(SignalName { node: Some(node), what, at }), word.len() + 1 + length));
@@ -171,6 +182,12 @@ fn number_or_signal(text: &str, at: Position) -> Result<(Token, usize), LocatedE
     let number = text[..length].parse().ok().filter(|number: &f64| number.is_finite());
     let number = number.ok_or_else(|| LocatedError::new(at, format!("{} is too large", &text[..length])))?;
     Ok((Token::Number(number), length))
+}
+
+/// The index of an object without sub-index: `0x2100`. Lower numbers are the indices of data types.
+fn index(word: &str) -> Option<u16> {
+    let digits = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X")).filter(|digits| digits.len() == 4)?;
+    u16::from_str_radix(digits, 16).ok().filter(|index| *index >= 0x1000)
 }
 
 /// The type after an object, and the length of its text: `/i16`. Any other text after the slash is a divisor.
@@ -189,11 +206,11 @@ fn alphanumeric(text: &str) -> &str {
     text.find(|character: char| !character.is_ascii_alphanumeric()).map_or(text, |end| &text[..end])
 }
 
-/// Whether the text after `5.` is a signal: a name, or an object with a colon.
+/// Whether the text after `5.` is a signal: a name, or an object.
 fn is_signal(text: &str) -> bool {
     let word = alphanumeric(text);
     match word.chars().next() {
-        Some(first) if first.is_ascii_digit() => text[word.len()..].starts_with(':'),
+        Some(first) if first.is_ascii_digit() => text[word.len()..].starts_with(':') || index(word).is_some(),
         Some(first) => first.is_ascii_alphabetic() && !is_exponent(word),
         None => text.starts_with(['"', '\'']),
     }

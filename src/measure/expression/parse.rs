@@ -3,6 +3,7 @@
 use super::LocatedError;
 use super::lex::{Token, tokens};
 use super::tree::{Condition, Function, Operator, Position, Quantity, Relation, SignalName};
+use crate::canopen::object::ObjectId;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
 
@@ -52,7 +53,8 @@ impl Parsed {
 
 /// Parses a condition.
 pub(super) fn parse(text: &str) -> Result<Condition, LocatedError> {
-    let mut parser = Parser { tokens: tokens(text)?, next: 0, end: Position(text.len()), depth: 0, operators: 0 };
+    let tokens = tokens(text)?;
+    let mut parser = Parser { tokens, next: 0, end: Position(text.len()), depth: 0, operators: 0 };
     let (condition, _) = parser.or()?.condition(parser.at())?;
     match parser.peek() {
         None => Ok(condition),
@@ -72,6 +74,7 @@ pub(super) fn parse(text: &str) -> Result<Condition, LocatedError> {
 fn spelling(token: &Token) -> String {
     match token {
         Token::Number(number) => number.to_string(),
+        Token::Index(index) => format!("0x{index:04X}"),
         Token::Signal(signal) => signal.to_string(),
         Token::Word(word) => format!("\"{word}\""),
         Token::Sign(sign) => format!("\"{sign}\""),
@@ -173,21 +176,47 @@ impl Parser {
         let left = self.sum()?;
         let at = self.at();
         if self.skip("in") {
-            let value = left.quantity()?;
+            let mut value = left.quantity()?;
             let low = self.sum()?.quantity()?;
             self.expect("..").map_err(|error| error.hint("write \"..\" between the ends of the range: 9.95..10.05"))?;
             let high = self.sum()?.quantity()?;
-            let (low, high) = share_unit(low, high)?;
+            let (mut low, mut high) = share_unit(low, high)?;
+            self.name_object(&mut [&mut value, &mut low, &mut high]);
             return Ok(Parsed::Condition(Condition::Within(value, low, high, at), start));
         }
         for relation in RELATIONS {
             if self.skip(relation.as_str()) {
-                let left = left.quantity()?;
-                let right = self.sum()?.quantity()?;
+                let mut left = left.quantity()?;
+                let mut right = self.sum()?.quantity()?;
+                self.name_object(&mut [&mut left, &mut right]);
                 return Ok(Parsed::Condition(Condition::Compare(left, relation, right, at), start));
             }
         }
         Ok(left)
+    }
+
+    /// If these parts of a comparison contain no signal, the first index in them is an object with sub-index 0.
+    fn name_object(&self, parts: &mut [&mut Quantity]) {
+        if parts.iter().all(|part| part.is_constant()) {
+            parts.iter_mut().any(|part| self.name_first_object(part));
+        }
+    }
+
+    fn name_first_object(&self, part: &mut Quantity) -> bool {
+        match part {
+            Quantity::Number(_, None, at) => {
+                let token = self.tokens.iter().find(|(_, position)| position.0 == at.0);
+                let Some(&(Token::Index(index), at)) = token else { return false };
+                let what = Wanted::Object(ObjectId::new(index, 0), None);
+                *part = Quantity::Signal(SignalName { node: None, what, at });
+                true
+            }
+            Quantity::Number(..) | Quantity::Signal(_) => false,
+            Quantity::Negative(inner, _) | Quantity::Absolute(inner, _) | Quantity::Aggregate(_, inner, _) => {
+                self.name_first_object(inner)
+            }
+            Quantity::Arithmetic(left, _, right, _) => self.name_first_object(left) || self.name_first_object(right),
+        }
     }
 
     fn sum(&mut self) -> Result<Parsed, LocatedError> {
@@ -233,6 +262,7 @@ impl Parser {
         self.next += 1;
         match token {
             Token::Number(number) => Ok(Parsed::Quantity(Quantity::Number(number, self.unit()?, at))),
+            Token::Index(index) => Ok(Parsed::Quantity(Quantity::Number(index.into(), self.unit()?, at))),
             Token::Signal(signal) => Ok(Parsed::Quantity(Quantity::Signal(signal))),
             Token::Sign("(") => {
                 let inner = self.nested(Parser::or)?;
@@ -266,8 +296,9 @@ impl Parser {
             let error = LocatedError::new(at, format!("unknown function {word}()"));
             return Err(error.hint(format!("functions: {}", names.join(", "))));
         };
-        let inner = self.nested(Parser::sum)?.quantity()?;
+        let mut inner = self.nested(Parser::sum)?.quantity()?;
         self.expect(")")?;
+        self.name_object(&mut [&mut inner]);
         Ok(Parsed::Quantity(Quantity::Aggregate(function, Box::new(inner), at)))
     }
 
@@ -325,5 +356,28 @@ fn literal(quantity: &mut Quantity) -> Option<(f64, &mut Option<Unit>)> {
         Quantity::Number(number, unit, _) => Some((*number, unit)),
         Quantity::Negative(inner, _) => literal(inner).map(|(number, unit)| (-number, unit)),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn object_without_sub_index() {
+        for (text, meaning) in [
+            ("0x2100 > 0", "0x2100:0 > 0"),
+            ("0 < 0x2100", "0 < 0x2100:0"),
+            ("0x6041 == 0x1237", "0x6041:0 == 4663"),
+            ("0x6041 != 0x6042:1", "24641 != 0x6042:1"),
+            ("pressure < 0x2100", "pressure < 8448"),
+            ("0x2100 in 1..5 and p < 0x2100", "0x2100:0 in 1..5 and p < 8448"),
+            ("mean(0x2100) < 0x2000", "mean(0x2100:0) < 8192"),
+            ("-|0x2100| < 3", "-|0x2100:0| < 3"),
+            ("0x2100/i16 < 0", "0x2100:0/i16 < 0"),
+            ("5.0x2100 < 6.0x2100/u8", "5.0x2100:0 < 6.0x2100:0/u8"),
+        ] {
+            assert_eq!(parse(text).expect("a condition").to_string(), meaning);
+        }
     }
 }

@@ -43,7 +43,7 @@ fn comparison(quantities: &[&Quantity], at: Position, seen: &mut Option<Availabi
         return Ok(());
     }
     Err(LocatedError::new(at, "this comparison contains no signal")
-        .hint("add a signal: pressure, 5.pressure, or an object with its sub-index: 0x1001:0"))
+        .hint("add a signal: pressure, 5.pressure, or an object: 0x1001"))
 }
 
 fn availability(quantity: &Quantity, seen: &mut Option<Availability>) -> Result<Availability, LocatedError> {
