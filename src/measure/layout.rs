@@ -296,12 +296,12 @@ impl Signal {
     }
 }
 
-/// Whether a mapped field of `bits` bits holds a value of this type. Unsigned numbers may have fewer bits.
+/// Whether a mapped field of `bits` bits holds a value of this type. An unsigned number may lack bits of its last byte.
 pub fn fits(data_type: DataType, bits: u8) -> bool {
     let width = data_type.width().map(|width| 8 * width);
     match data_type {
         DataType::Boolean | DataType::Unsigned(_) => {
-            width.is_some_and(|width| (1..=width).contains(&usize::from(bits)))
+            width.is_some_and(|width| (width - 7..=width).contains(&usize::from(bits)))
         }
         _ => width == Some(usize::from(bits)),
     }

@@ -39,7 +39,7 @@ pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
 pub fn unknown_type(signal: &str) -> String {
     match signal.split_once('/') {
         Some((object, stated)) => format!("the width of {object} is not that of {stated}: no value"),
-        None => format!("the type of {signal} is unknown: no value"),
+        None => format!("the type of {signal} is unknown, or has another width: no value"),
     }
 }
 

@@ -237,9 +237,10 @@ fn unknown_type_has_no_value_and_the_bytes_as_received() {
         stated(ObjectId::new(0x2100, 1), DataType::Real32),
         // The type has another width than the mapped bits.
         stated(ObjectId::new(0x6010, 0), DataType::Integer(4)),
+        stated(ObjectId::new(0x6010, 0), DataType::Unsigned(4)),
     ];
     let found = rows(&other, &wanted, "181#2EFB0000AC41");
-    let expected = [("0x6010:0/i16", "-1234"), ("0x6010:0/i32", ""), ("0x2100:1/r32", "21.5")];
+    let expected = [("0x6010:0/i16", "-1234"), ("0x6010:0/i32", ""), ("0x6010:0/u32", ""), ("0x2100:1/r32", "21.5")];
     assert_eq!(found, expected.map(|(signal, value)| row(signal, value, "")));
 }
 
