@@ -19,7 +19,7 @@ pub mod transfer;
 pub use lss::{Lss, LssError};
 pub use missed_answer::MissedAnswer;
 pub use request::{Answer, NUMBER_LIMIT, Operation, Request, SdoError, SdoFailure, TEXT_LIMIT, Ticket};
-pub use second_answer::{OnTwoDevices, SecondAnswer};
+pub use second_answer::{Answers, OnTwoDevices, SecondAnswer};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, TransferKind, read_object, write_object};
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};

@@ -93,8 +93,8 @@ impl SdoError {
 }
 
 /// The answers of one node.
-#[derive(Debug, Default)]
-pub(super) struct Answers {
+#[derive(Clone, Debug, Default)]
+pub struct Answers {
     /// The first frame of the latest answer, and the operation that it answers.
     initial: Option<(Frame, Operation)>,
     /// The latest frame that was used.
@@ -115,7 +115,7 @@ pub(super) struct Answers {
 
 impl Answers {
     /// The two different answers; if there are none, the repeated answer.
-    pub(super) fn finding(&self) -> Option<SecondAnswer> {
+    pub fn finding(&self) -> Option<SecondAnswer> {
         self.finding
     }
 
@@ -131,7 +131,7 @@ impl Answers {
     }
 
     /// The request for this object was repeated or dropped.
-    pub(super) fn on_repeated(&mut self, object: ObjectId) {
+    pub fn on_repeated(&mut self, object: ObjectId) {
         self.repeated.insert(object);
     }
 
@@ -141,7 +141,7 @@ impl Answers {
     }
 
     /// A frame was used as an answer; `asked_at` is given if it is the first one of its transfer.
-    pub(super) fn on_answer(&mut self, frame: Frame, operation: Operation, asked_at: Option<Mono>, at: Mono) {
+    pub fn on_answer(&mut self, frame: Frame, operation: Operation, asked_at: Option<Mono>, at: Mono) {
         self.latest = Some(frame);
         let Some(asked_at) = asked_at else { return };
         // The time for a second answer to the previous request is over.
@@ -168,7 +168,7 @@ impl Answers {
     }
 
     /// Handles a frame that does not answer a request. Returns whether it is a second answer.
-    pub(super) fn on_unexpected(&mut self, frame: &Frame, at: Mono) -> bool {
+    pub fn on_unexpected(&mut self, frame: &Frame, at: Mono) -> bool {
         let object = multiplexer(frame.data());
         if self.may_be_foreign(at) || object.is_some_and(|object| self.repeated.contains(&object)) {
             return false;

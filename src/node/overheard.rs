@@ -7,7 +7,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::device::catalog::{Model, recognise};
-use crate::master::Operation;
+use crate::master::{Operation, SecondAnswer};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -29,6 +29,11 @@ impl Overheard {
             learned = self.learn(transfer).or(learned);
         }
         learned
+    }
+
+    /// The next node that sent two answers to one request, with the object.
+    pub fn next_second_answer(&mut self) -> Option<(NodeId, ObjectId, SecondAnswer)> {
+        self.transfers.next_second_answer()
     }
 
     /// Forgets the objects of a node for which `is_forgotten` is true.

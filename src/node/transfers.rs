@@ -11,8 +11,9 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, Uploaded, Violation, multiplexer, proves_60};
 pub use crate::master::Operation;
+use crate::master::{Answers, SecondAnswer};
 use open::{Open, Step};
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 /// A read without frames for this time has ended.
@@ -97,6 +98,8 @@ pub struct Transfers {
     finished: VecDeque<Transfer>,
     /// Nodes that answer reads with 60h.
     answers_60: BTreeSet<NodeId>,
+    answers: BTreeMap<NodeId, Answers>,
+    second_answers: VecDeque<(NodeId, ObjectId, SecondAnswer)>,
 }
 
 impl Transfers {
@@ -117,6 +120,12 @@ impl Transfers {
     /// The next transfer that has ended.
     pub fn next_finished(&mut self) -> Option<Transfer> {
         self.finished.pop_front()
+    }
+
+    /// The next node that sent two answers to one request, with the object. Each node is reported once, and once more if
+    /// the answers differ only later.
+    pub fn next_second_answer(&mut self) -> Option<(NodeId, ObjectId, SecondAnswer)> {
+        self.second_answers.pop_front()
     }
 
     /// When the next transfer without an answer ends.
@@ -149,6 +158,9 @@ impl Transfers {
     /// Ends a transfer. `at` is the time of the frame that ended it.
     fn finish(&mut self, index: usize, at: Option<Stamp>, outcome: Outcome) {
         let open = self.open.remove(index);
+        if outcome == Outcome::NoAnswer && open.answered.is_none() {
+            self.answers.entry(open.node).or_default().on_repeated(open.object);
+        }
         self.finished.push_back(open.finished(at, outcome));
     }
 
@@ -197,7 +209,13 @@ impl Transfers {
             Some(object) if is_first => self.position(node, |open| open.object == object && !open.has_begun()),
             _ => self.position(node, Open::has_begun),
         };
-        let Some(index) = index else { return false };
+        let Some(index) = index else {
+            self.on_stray_answer(node, received);
+            return false;
+        };
+        if is_first {
+            self.on_first_answer(index, received);
+        }
         if self.open[index].object == ObjectId::DEVICE_TYPE && proves_60(frame) {
             self.answers_60.insert(node);
         }
@@ -225,7 +243,15 @@ impl Transfers {
     }
 
     fn on_abort(&mut self, node: NodeId, object: ObjectId, received: &Received, by_master: bool) -> bool {
-        let Some(index) = self.position(node, |open| open.object == object) else { return false };
+        let Some(index) = self.position(node, |open| open.object == object) else {
+            if !by_master {
+                self.on_stray_answer(node, received);
+            }
+            return false;
+        };
+        if !by_master && !self.open[index].has_begun() {
+            self.on_first_answer(index, received);
+        }
         let code = match received.frame.data() {
             [_, _, _, _, a, b, c, d, ..] => AbortCode(u32::from_le_bytes([*a, *b, *c, *d])),
             _ => AbortCode(0),
@@ -235,6 +261,22 @@ impl Transfers {
         }
         self.finish(index, Some(received.at), Outcome::Aborted { code, by_master });
         true
+    }
+
+    fn on_first_answer(&mut self, index: usize, received: &Received) {
+        let Open { node, operation, requested, .. } = self.open[index];
+        let answers = self.answers.entry(node).or_default();
+        answers.on_answer(received.frame, operation, Some(requested.mono), received.at.mono);
+    }
+
+    /// Handles an answer without a request. Two devices, or a bridge that repeats frames, send two answers to one.
+    fn on_stray_answer(&mut self, node: NodeId, received: &Received) {
+        let Some(object) = multiplexer(received.frame.data()) else { return };
+        let answers = self.answers.entry(node).or_default();
+        let before = answers.finding();
+        answers.on_unexpected(&received.frame, received.at.mono);
+        let finding = answers.finding().filter(|_| answers.finding() != before);
+        self.second_answers.extend(finding.map(|finding| (node, object, finding)));
     }
 
     fn start(&mut self, new: Open) -> bool {

@@ -254,8 +254,14 @@ fn check_recording(
     }
     let started = checker.started;
     let verdicts = checker.verdicts(&outcome)?;
-    let failures = outcome.failed.into_iter().chain(outcome.nothing).collect();
+    let failures = failures(&outcome).cloned().collect();
     Ok(CheckReport { verdicts, started, length: outcome.length, failures, remarks: outcome.remarks })
+}
+
+/// The failures of a recording. Verdicts refer to them by their index.
+fn failures(report: &RecordingReport) -> impl Iterator<Item = &Failure> {
+    let nodes = report.two_devices.iter().chain(&report.replaced);
+    report.failed.iter().chain(&report.nothing).chain(nodes)
 }
 
 /// An observer of a recording that evaluates expressions, and passes all calls on to another observer.
@@ -350,7 +356,7 @@ impl<'a> Checker<'a> {
         if let Some(failure) = self.failure {
             return Err(failure);
         }
-        let mut all_missing = self.missing_nodes();
+        let mut all_missing = Vec::new();
         let missing = |&node: &NodeId| {
             let reason = match report.nothing {
                 Some(_) => Reason::Failed(report.failed.len()),
@@ -359,6 +365,10 @@ impl<'a> Checker<'a> {
             MissingData { node, signal: None, reason }
         };
         all_missing.extend(report.lost.iter().map(missing));
+        let of_node = |(at, failure): (usize, &Failure)| {
+            Some(MissingData { node: failure.node?, signal: None, reason: Reason::Failed(at) })
+        };
+        all_missing.extend(failures(report).enumerate().filter_map(of_node));
         if !self.is_bound && !self.skip_unsupported {
             self.evaluator.add_missing_nodes(&self.nodes);
         }

@@ -36,7 +36,7 @@ pub(super) use changes::changes;
 pub use changes::{Change, TpdoChange};
 use checks::{check_wanted, refuse_second_sync, sync_share};
 pub use events::EventCounts;
-pub(super) use passive::SetupListener;
+pub(super) use passive::{SetupListener, is_constant};
 use poll::Poll;
 pub use producer::SyncStatistics;
 use recording::Recording;
@@ -187,7 +187,7 @@ pub struct RecordingReport {
     /// Nodes whose setup could not be read. They were not recorded.
     pub failed: Vec<Failure>,
     /// Nodes with a TPDO that two devices send. From then on, these TPDOs were ignored.
-    pub two_senders: Vec<Failure>,
+    pub two_devices: Vec<Failure>,
     /// Nodes that were replaced by other devices.
     pub replaced: Vec<Failure>,
     /// Nodes that sent no samples, or stopped before the end.

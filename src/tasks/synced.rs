@@ -1,15 +1,26 @@
 //! Detects TPDOs that arrive more than once per SYNC, because two devices send them or a bridge repeats frames.
 
+use crate::bus::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::{TpdoNumber, Transmission};
 use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// The number of TPDOs that may arrive in excess if another node sends SYNC. The SYNC before the first TPDO may not have
 /// been received.
 const FOREIGN_TOLERANCE: u64 = 1;
+
+/// A TPDO of unknown transmission type depends on SYNC if it arrives in pairs at this many SYNC messages in a row.
+const PAIRS: u32 = 3;
+
+/// The frames of such a pair arrive within this part of the SYNC interval.
+const PAIR_PART: u32 = 4;
+
+/// After this many SYNC messages of another node for a TPDO, a second sender would have been found.
+const SETTLED_SYNCS: u64 = FOREIGN_TOLERANCE + 2;
 
 /// A TPDO that arrived without a SYNC for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,20 +35,60 @@ pub(super) struct Surplus {
     pub(super) is_new: bool,
 }
 
-/// A TPDO that is sent at every n-th SYNC.
+/// A TPDO that is sent at every n-th SYNC, or whose transmission type is unknown.
 #[derive(Debug)]
 struct SyncedTpdo {
     node: NodeId,
     number: TpdoNumber,
     sync: CanId,
-    every: u64,
+    /// The n; `None` if the transmission type is unknown.
+    every: Option<u64>,
     /// SYNC messages, remote requests, and the TPDOs after the first SYNC.
     syncs: u64,
     requests: u64,
     received: u64,
     last: Option<Frame>,
+    /// The time of the last SYNC, and of the TPDOs since then.
+    last_sync: Option<Mono>,
+    since_sync: Vec<Mono>,
+    /// The time between the last two SYNC messages.
+    interval: Duration,
+    /// The latest SYNC messages in a row with a pair of TPDOs.
+    pairs: u32,
     is_repeated: bool,
     is_shared: bool,
+}
+
+impl SyncedTpdo {
+    fn on_sync(&mut self, at: Mono) {
+        self.syncs += 1;
+        self.interval = self.last_sync.replace(at).map_or(Duration::ZERO, |last| at.since(last));
+        self.pairs = if self.has_pair() { self.pairs + 1 } else { 0 };
+        self.since_sync.clear();
+    }
+
+    /// Whether two TPDOs arrived since the last SYNC, one shortly after the other.
+    fn has_pair(&self) -> bool {
+        matches!(self.since_sync[..], [first, second] if second.since(first) < self.interval / PAIR_PART)
+    }
+
+    /// Whether a TPDO that arrives now is in excess.
+    fn is_surplus(&self, is_producer: bool) -> bool {
+        let Some(every) = self.every else {
+            return self.is_shared || self.pairs + 1 >= PAIRS && self.has_pair() && self.requests == 0;
+        };
+        let due = self.requests
+            + match is_producer {
+                true => self.syncs.div_ceil(every),
+                false => self.syncs / every + FOREIGN_TOLERANCE,
+            };
+        self.syncs > 0 && (self.received >= due || self.is_shared)
+    }
+
+    /// Whether a second sender would have been found.
+    fn is_settled(&self) -> bool {
+        self.last.is_none() || self.syncs >= self.every.map_or(u64::from(PAIRS) + 1, |every| every * SETTLED_SYNCS)
+    }
 }
 
 /// The TPDOs of nodes that are sent on SYNC.
@@ -66,9 +117,12 @@ impl SyncedTpdos {
         let is_requesting = self.is_requesting;
         let is_watched = |tpdo: &&Tpdo| tpdo.cob_id.is_valid() && !(is_requesting && tpdo.cob_id.allows_rtr());
         for tpdo in node.tpdos.iter().filter(is_watched) {
-            let Some(Transmission::Sync(every)) = tpdo.transmission else { continue };
+            let every = match tpdo.transmission {
+                Some(Transmission::Sync(every)) => Some(u64::from(every.max(1))),
+                Some(_) => continue,
+                None => None,
+            };
             let id = tpdo.cob_id.can_id();
-            let every = u64::from(every.max(1));
             let known = own.remove(&id).filter(|known| known.every == every && known.sync == node.sync);
             let new = SyncedTpdo {
                 node: node.id,
@@ -79,6 +133,10 @@ impl SyncedTpdos {
                 requests: 0,
                 received: 0,
                 last: None,
+                last_sync: None,
+                since_sync: Vec::new(),
+                interval: Duration::ZERO,
+                pairs: 0,
                 is_repeated: false,
                 is_shared: false,
             };
@@ -87,21 +145,33 @@ impl SyncedTpdos {
     }
 
     /// SYNC was sent with this COB-ID.
-    pub(super) fn on_sync(&mut self, id: CanId) {
-        self.tpdos.values_mut().filter(|tpdo| tpdo.sync == id).for_each(|tpdo| tpdo.syncs += 1);
+    pub(super) fn on_sync(&mut self, id: CanId, at: Mono) {
+        self.tpdos.values_mut().filter(|tpdo| tpdo.sync == id).for_each(|tpdo| tpdo.on_sync(at));
+    }
+
+    /// Whether another node may send the SYNC for this TPDO, and a second sender would not have been found yet.
+    pub(super) fn is_open(&self, id: CanId) -> bool {
+        !self.is_producer && self.tpdos.get(&id).is_some_and(|tpdo| !tpdo.is_settled())
+    }
+
+    /// Whether a second sender would have been found for each TPDO that was received.
+    pub(super) fn is_settled(&self) -> bool {
+        self.is_producer || self.tpdos.values().all(SyncedTpdo::is_settled)
     }
 
     /// Frames were lost, perhaps SYNC messages.
     pub(super) fn on_lost_frames(&mut self) {
-        self.tpdos.values_mut().for_each(|tpdo| (tpdo.syncs, tpdo.requests, tpdo.received) = (0, 0, 0));
+        for tpdo in self.tpdos.values_mut() {
+            (tpdo.syncs, tpdo.requests, tpdo.received, tpdo.pairs) = (0, 0, 0, 0);
+        }
     }
 
     /// Handles a frame. Returns a surplus TPDO, which must not be used.
-    pub(super) fn take(&mut self, frame: &Frame) -> Option<Surplus> {
+    pub(super) fn take(&mut self, frame: &Frame, at: Mono) -> Option<Surplus> {
         let is_producer = self.is_producer;
         let Some(tpdo) = self.tpdos.get_mut(&frame.id()) else {
             if !is_producer && !frame.is_remote() {
-                self.on_sync(frame.id());
+                self.on_sync(frame.id(), at);
             }
             return None;
         };
@@ -110,13 +180,10 @@ impl SyncedTpdos {
             tpdo.requests = if tpdo.syncs > 0 { tpdo.requests + 1 } else { 1 };
             return None;
         }
-        let due = tpdo.requests
-            + match is_producer {
-                true => tpdo.syncs.div_ceil(tpdo.every),
-                false => tpdo.syncs / tpdo.every + FOREIGN_TOLERANCE,
-            };
+        tpdo.since_sync.push(at);
+        tpdo.since_sync.truncate(3);
         let previous = tpdo.last.replace(*frame);
-        if tpdo.syncs == 0 || tpdo.received < due && !tpdo.is_shared {
+        if !tpdo.is_surplus(is_producer) {
             tpdo.received += u64::from(tpdo.syncs > 0);
             return None;
         }
@@ -132,13 +199,14 @@ mod tests {
     use super::*;
     use crate::canopen::pdo::CobId;
 
-    /// The result for a TPDO at every n-th SYNC: `S` is SYNC, and other letters are TPDOs with this content.
+    /// The result for a TPDO at every n-th SYNC (0: its type is unknown): `S` is SYNC, `-` a pause, and other letters
+    /// are TPDOs with this content, one every millisecond.
     fn found(is_producer: bool, every: u8, frames: &str) -> Vec<(usize, bool)> {
         let mut node = Node::new(NodeId::new(5).expect("a node-ID"));
         node.tpdos.push(Tpdo {
             number: TpdoNumber::new(1).expect("a number"),
             cob_id: CobId(0x4000_0185),
-            transmission: Some(Transmission::Sync(every)),
+            transmission: (every > 0).then_some(Transmission::Sync(every)),
             event_timer_ms: None,
             mapping: Vec::new(),
         });
@@ -146,16 +214,18 @@ mod tests {
         synced.set_up(&node);
         let mut found = Vec::new();
         for (at, letter) in frames.bytes().enumerate() {
+            let now = Mono::START + Duration::from_millis(at as u64);
             if letter == b'S' && is_producer {
-                synced.on_sync(CanId::SYNC);
+                synced.on_sync(CanId::SYNC, now);
                 continue;
             }
             let text = match letter {
+                b'-' => continue,
                 b'S' => "080#".to_owned(),
                 b'R' => "185#R1".to_owned(),
                 _ => format!("185#{letter:02X}"),
             };
-            let surplus = synced.take(&text.parse().expect("a frame"));
+            let surplus = synced.take(&text.parse().expect("a frame"), now);
             found.extend(surplus.filter(|surplus| surplus.is_new).map(|surplus| (at, surplus.differs)));
         }
         found
@@ -182,5 +252,19 @@ mod tests {
         assert_eq!(found(false, 1, "SabSab"), [(5, true)]);
         assert_eq!(found(false, 1, "SaaSaaSaa"), [(5, false)]);
         assert_eq!(found(false, 2, "aSSbSScSSdSSe"), []);
+    }
+
+    #[test]
+    fn tpdo_of_unknown_type_in_pairs_at_sync_has_two_senders() {
+        let pairs = |pair: &str, count: usize| format!("{pair}------").repeat(count);
+        for is_producer in [false, true] {
+            assert_eq!(found(is_producer, 0, &pairs("Sab", 2)), []);
+            assert_eq!(found(is_producer, 0, &pairs("Sab", 4)), [(20, true)]);
+            assert_eq!(found(is_producer, 0, &pairs("Saa", 4)), [(20, false)]);
+            assert_eq!(found(is_producer, 0, &pairs("Sa---b", 4)), [], "a timer of half the interval");
+            assert_eq!(found(is_producer, 0, &pairs("Sabc", 4)), [], "sent on change");
+            assert_eq!(found(is_producer, 0, &"Sab------Sa-------".repeat(4)), []);
+            assert_eq!(found(is_producer, 0, &pairs("SRab", 4)), [], "answers to remote requests");
+        }
     }
 }

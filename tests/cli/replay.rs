@@ -42,6 +42,7 @@ fn second_sender_of_a_tpdo_is_found_in_a_recording() {
     let bench = Bench::of("mh4@5");
     let log = "log 5 pressure --device mh4";
     cycles(&bench, &["185#0000A03F00", "185#0000204000"]);
+    replay(&bench, "t.log", "check 5 pressure<100 --device mh4").exit(6);
     let done = replay(&bench, "t.log", log).exit(6);
     assert!(done.stderr.contains("node 5: TPDO1 arrives twice at a SYNC, with different values"), "{}", done.stderr);
     cycles(&bench, &["185#0000A03F00", "185#0000A03F00"]);
@@ -49,6 +50,94 @@ fn second_sender_of_a_tpdo_is_found_in_a_recording() {
     assert!(done.stderr.contains("TPDO1 arrives twice at a SYNC: two devices send it"), "{}", done.stderr);
     cycles(&bench, &["185#0000A03F00", "285#0000A03F00"]);
     assert!(!replay(&bench, "t.log", log).exit(0).stderr.contains("twice"));
+}
+
+/// Writes `t.log`: another master reads the setup of node 5 without its transmission type, and starts it. Then these
+/// frames follow, with the time in microseconds.
+fn set_up_by_master(bench: &Bench, extra: &[(u32, &str)]) {
+    let setup = [
+        "605#4000100000000000",
+        "585#4300100094010200",
+        "605#4000180100000000",
+        "585#4300180185010000",
+        "605#40001A0000000000",
+        "585#4F001A0002000000",
+        "605#40001A0100000000",
+        "585#43001A0120013061",
+        "605#40001A0200000000",
+        "585#43001A0208015061",
+        "605#4031610100000000",
+        "585#4331610100004E00",
+        "605#4032610100000000",
+        "585#4F32610102000000",
+        "000#0105",
+    ];
+    let mut frames: Vec<(u32, &str)> = (0..).step_by(1000).zip(setup).chain(extra.iter().copied()).collect();
+    frames.sort_by_key(|&(at, _)| at);
+    let lines = frames.iter().map(|(at, frame)| format!("(100.{at:06}) can0 {frame}\n"));
+    fs::write(bench.path("t.log"), lines.collect::<String>()).expect("written");
+}
+
+const VALUES: [(u32, &str); 3] =
+    [(100_000, "185#0000A03F00"), (200_000, "185#0000C03F00"), (300_000, "185#0000E03F00")];
+
+#[test]
+fn second_answer_to_a_recorded_request_is_reported() {
+    let bench = Bench::of("mh4@5");
+    // The second answer may come after the next request. A unit, a mapping entry, the vendor, an abort.
+    for (at, answer) in [
+        (11_500, "585#43316101000000AB"),
+        (12_500, "585#43316101000000AB"),
+        (7_500, "585#43001A0110013071"),
+        (13_500, "585#8032610100000206"),
+    ] {
+        set_up_by_master(&bench, &[&VALUES[..], &[(at, answer)]].concat());
+        let done = replay(&bench, "t.log", "log 5").exit(6);
+        assert_eq!(done.stdout.lines().count(), 0, "{answer}: {}", done.stdout);
+        let reason = "two devices have this node-ID: one request got the answers 585#";
+        assert!(done.stderr.contains(reason) && done.stderr.contains(answer), "{}", done.stderr);
+        replay(&bench, "t.log", "check 5 ch1<100").exit(6);
+        replay(&bench, "t.log", "pdo watch 5").exit(6);
+    }
+    // The same answer twice.
+    set_up_by_master(&bench, &[&VALUES[..], &[(11_500, "585#4331610100004E00")]].concat());
+    let done = replay(&bench, "t.log", "log 5").exit(0);
+    assert!(done.stderr.contains("node 5: answers arrive twice: two devices have node-ID 5"), "{}", done.stderr);
+    assert_eq!(done.stdout.lines().count(), 4);
+    // A repeated request has two answers, and a measured value changes.
+    let polled = [
+        (20_000, "605#4030610100000000"),
+        (21_000, "605#4030610100000000"),
+        (22_000, "585#433061010000A03F"),
+        (23_000, "585#433061010000C03F"),
+    ];
+    set_up_by_master(&bench, &[&VALUES[..], &polled].concat());
+    assert!(!replay(&bench, "t.log", "log 5").exit(0).stderr.contains("two devices"));
+    let twice = [polled[0], polled[2], polled[3]];
+    set_up_by_master(&bench, &[&VALUES[..], &twice].concat());
+    assert!(replay(&bench, "t.log", "log 5").exit(0).stderr.contains("two devices have this node-ID"));
+}
+
+#[test]
+fn pairs_of_tpdos_at_sync_have_no_rows() {
+    let bench = Bench::of("mh4@5");
+    let cycles = |second: [&'static str; 2]| {
+        let frames = (1..=5).flat_map(move |cycle: u32| {
+            [(0, "080#"), (200, "185#0000A03F00"), (900, second[cycle as usize % 2])]
+                .map(|(at, it)| (cycle * 100_000 + at, it))
+        });
+        frames.collect::<Vec<_>>()
+    };
+    set_up_by_master(&bench, &cycles(["185#0000F04000", "185#0000E84000"]));
+    for line in ["log 5", "check 5 ch1<100"] {
+        let done = replay(&bench, "t.log", line).exit(6);
+        assert!(!done.stdout.contains("ok"), "{}", done.stdout);
+        let reason = "node 5: TPDO1 arrives twice at a SYNC, with different values: two devices";
+        assert!(done.stderr.contains(reason), "{}", done.stderr);
+    }
+    set_up_by_master(&bench, &cycles(["185#0000A03F00"; 2]));
+    let done = replay(&bench, "t.log", "log 5").exit(0);
+    assert!(done.stderr.contains("TPDO1 arrives twice at a SYNC: two devices send it"), "{}", done.stderr);
 }
 
 #[test]

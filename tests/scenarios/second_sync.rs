@@ -4,7 +4,7 @@ use super::Kept;
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
-use cangauge::canopen::id::NodeId;
+use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::master::{Master, Timing};
 use cangauge::output::events::remark_text;
 use cangauge::output::failure::ErrorMessage;
@@ -46,11 +46,16 @@ fn record(mode: Mode) -> (MemoryBus, Kept, Result<u64, Failure>) {
     record_beside(Controller { next: Mono::START + PERIOD, frame: "080#" }, mode, true)
 }
 
-fn record_beside(controller: Controller, mode: Mode, start_all: bool) -> (MemoryBus, Kept, Result<u64, Failure>) {
+/// A bus with node 5 and this controller.
+fn beside(controller: Controller) -> MemoryBus {
     let text = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
     let mut bus = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("a bus");
     bus.attach(controller);
-    let plan = LogOptions {
+    bus
+}
+
+fn options(mode: Mode, start_all: bool) -> LogOptions {
+    LogOptions {
         nodes: vec![NodeId::new(5).expect("a node-ID")],
         wanted: Vec::new(),
         mode,
@@ -60,9 +65,13 @@ fn record_beside(controller: Controller, mode: Mode, start_all: bool) -> (Memory
         start_all,
         max_gap: None,
         overrides: BTreeMap::new(),
-    };
+    }
+}
+
+fn record_beside(controller: Controller, mode: Mode, start_all: bool) -> (MemoryBus, Kept, Result<u64, Failure>) {
+    let mut bus = beside(controller);
     let mut kept = Kept::default();
-    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept);
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &options(mode, start_all), &mut kept);
     (bus, kept, outcome.map(|outcome| outcome.rows))
 }
 
@@ -138,6 +147,40 @@ fn second_sender_of_a_watched_tpdo_is_found() {
     let (events, failures) = watched(None);
     assert_eq!((events.iter().filter(|event| event.starts_with("Repeated")).count(), failures.len()), (1, 0));
     assert!((18..24).contains(&events.iter().filter(|event| *event == "value").count()), "{events:?}");
+}
+
+/// Answers each SYNC like node 5, with other values.
+struct SecondSender(Option<Mono>);
+
+impl Station for SecondSender {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
+        if frame.id() == CanId::SYNC {
+            self.0 = Some(now + Duration::from_millis(2));
+        }
+    }
+
+    fn wake(&mut self, _: Mono, out: &mut Outbox) {
+        self.0 = None;
+        out.send("185#0000E84000".parse().expect("a frame"));
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.0
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn second_sender_at_the_sync_of_another_producer_gives_no_rows() {
+    let (mut bus, options) =
+        (beside(Controller { next: Mono::START + PERIOD, frame: "080#" }), options(Mode::AsSent, false));
+    bus.attach(SecondSender(None));
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &options, &mut kept);
+    assert_eq!((outcome.expect_err("two devices").kind(), kept.rows.len()), (Kind::Unexpected, 0));
 }
 
 #[test]

@@ -116,7 +116,7 @@ impl Finished {
         let deleted = self.deleted.first().map(|file| LogFailure::FileDeleted { file: file.clone() });
         let own = [self.ended_early(), self.too_slow(files), deleted, self.lost_nodes()];
         let mut failures: Vec<Failure> = failed.into_iter().collect();
-        failures.extend(self.report.two_senders.iter().chain(&self.report.replaced).cloned());
+        failures.extend(self.report.two_devices.iter().chain(&self.report.replaced).cloned());
         failures.extend(own.into_iter().flatten().map(Failure::general));
         let nodes = self.report.failed.clone();
         let partial = (failures.is_empty() && !nodes.is_empty()).then_some(Kind::Partial);

@@ -138,6 +138,10 @@ pub fn two_senders(number: TpdoNumber) -> String {
     format!("{number} arrives twice at a SYNC, with different values: two devices have this node-ID or COB-ID")
 }
 
+fn repeated_tpdo(number: TpdoNumber) -> String {
+    format!("{number} arrives twice at a SYNC: two devices send it, or a bridge repeats frames")
+}
+
 /// The text of a remark on a recording.
 pub fn remark_text(remark: &Remark) -> String {
     match remark {
@@ -155,10 +159,9 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::FreshnessNotProven => {
             "values were sent on remote request and may be old (--poll reads new values)".to_owned()
         }
-        Remark::RepeatedTpdo(node, number) => {
-            format!("node {node}: {number} arrives twice at a SYNC: two devices send it, or a bridge repeats frames")
-        }
+        Remark::RepeatedTpdo(node, number) => format!("node {node}: {}", repeated_tpdo(*number)),
         Remark::TwoSenders(node, number) => format!("node {node}: {}", two_senders(*number)),
+        Remark::SecondAnswer(node, answers) => crate::output::failure::second_answer(*node, *answers),
         Remark::PollFailed(error) => format!("node {}: {error}", error.node),
         Remark::ChangedWhileFramesLost(node, before) => {
             let before = format_duration(*before);

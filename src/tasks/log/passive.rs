@@ -9,6 +9,7 @@ use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
 use crate::device::unit::Unit;
+use crate::master::SecondAnswer;
 use crate::measure::decode::{Decoder, Wanted};
 use crate::measure::layout::{MeasuringRange, PROCESS_VALUES, Signal, Tpdo};
 use crate::measure::sample::Number;
@@ -66,6 +67,18 @@ impl SetupListener {
             self.not_understood.insert(frame.id(), node);
         }
         None
+    }
+
+    /// The next node that sent two answers to one request of another master, with the object.
+    pub(in crate::tasks) fn next_second_answer(&mut self) -> Option<(NodeId, ObjectId, SecondAnswer)> {
+        std::iter::from_fn(|| self.overheard.next_second_answer()).find(|(node, ..)| self.nodes.contains(node))
+    }
+
+    /// Ignores a node from now on. Returns whether others are left.
+    pub(in crate::tasks) fn exclude(&mut self, node: NodeId, decoder: &mut Decoder) -> bool {
+        self.nodes.remove(&node);
+        decoder.remove(node);
+        !self.nodes.is_empty()
     }
 
     /// Handles a restart of a node, which may have lost its setup. Its identity and the descriptions of the user stay
@@ -207,6 +220,11 @@ impl SetupListener {
 /// Whether an object belongs to the setup of the TPDOs, and not to the identity of the device.
 fn is_setup(object: ObjectId) -> bool {
     matches!(object.index, 0x1800..=0x1bff | 0x6131 | 0x6132)
+}
+
+/// Whether an object belongs to the setup of the TPDOs or to the identity, so that its value does not change by itself.
+pub(in crate::tasks) fn is_constant(object: ObjectId) -> bool {
+    is_setup(object) || matches!(object.index, 0x1000 | 0x1008..=0x100a | 0x1018)
 }
 
 /// The node that sends TPDOs with this COB-ID in the predefined connection set.

@@ -15,8 +15,9 @@ use super::silence::Questions;
 use super::states::NmtStates;
 use super::{LogEvent, LogFailure, LogOptions, Mode, Observer, Remark};
 use crate::bus::{Bus, Filters, Mono, ReceiveBuffer, Received, TimestampSource};
+use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
-use crate::canopen::pdo::{TpdoNumber, Transmission};
+use crate::canopen::pdo::Transmission;
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::layout::Tpdo;
@@ -36,6 +37,9 @@ use tally::Tally;
 /// A signal without values is reported only if the recording is at least this long.
 const MIN_SIGNAL_TIME: Duration = Duration::from_secs(1);
 
+/// The longest time for which values are kept if another node sends SYNC. Values are written within a second.
+const FOREIGN_SECOND_SENDER_TIMEOUT: Duration = Duration::from_millis(900);
+
 /// A recording: the setup of the nodes, and the values.
 pub(super) struct Recording<'o> {
     pub(super) options: &'o LogOptions,
@@ -49,11 +53,13 @@ pub(super) struct Recording<'o> {
     emergencies: Emergencies,
     due: DueTpdos,
     synced: SyncedTpdos,
-    /// TPDOs that two devices send. They are ignored.
-    pub(super) two_senders: BTreeMap<NodeId, TpdoNumber>,
+    /// Nodes whose node-ID or COB-ID two devices have. Their TPDOs are ignored.
+    pub(super) two_devices: BTreeMap<NodeId, Failure>,
     /// The values of the first SYNC. They are kept until it is known that no second device answers.
     early: Vec<Vec<Sample>>,
     early_until: Option<Mono>,
+    /// Whether values were kept because another node sends SYNC.
+    has_kept_early: bool,
     rereads: Rereads,
     timestamps: TimestampSource,
     receive_buffer: Option<ReceiveBuffer>,
@@ -104,9 +110,10 @@ impl<'o> Recording<'o> {
             emergencies,
             due: DueTpdos::default(),
             synced: SyncedTpdos::new(matches!(options.mode, Mode::Sync(_)), matches!(options.mode, Mode::Request(_))),
-            two_senders: BTreeMap::new(),
+            two_devices: BTreeMap::new(),
             early: Vec::new(),
             early_until: None,
+            has_kept_early: false,
             rereads: Rereads::new(&options.overrides),
             timestamps: bus.timestamps(),
             receive_buffer: bus.receive_buffer(),
@@ -264,14 +271,19 @@ impl<'o> Recording<'o> {
                 self.synced.set_up(&node);
                 self.report_shared_cob_ids(received.at, observer);
             }
+            let second = self.listener.as_mut().and_then(SetupListener::next_second_answer);
+            if let Some((node, object, answers)) = second {
+                self.second_answer(node, object, answers, received.at, observer)?;
+            }
             self.update_sources();
         }
         let decoded = self.decoder.decode(received, &mut self.samples);
         if matches!(decoded, Decoded::Tpdo(_) | Decoded::OtherFrame)
-            && let Some(surplus) = self.synced.take(&received.frame)
+            && let Some(surplus) = self.synced.take(&received.frame, received.at.mono)
         {
             return self.surplus(surplus, received.at, observer);
         }
+        self.keep_early(&received.frame, decoded, received.at.mono, observer)?;
         match decoded {
             Decoded::Tpdo(_) if self.early_until.is_some_and(|until| received.at.mono < until) => {
                 self.early.push(std::mem::take(&mut self.samples));
@@ -312,6 +324,25 @@ impl<'o> Recording<'o> {
             observer.event(&LogEvent::Remark(Remark::PollFailed(error)), master.bus().now());
         }
         Ok(self.take_samples(cycle, observer))
+    }
+
+    /// If another node may send SYNC, keeps the first values until a second device would have been found.
+    fn keep_early(
+        &mut self,
+        frame: &Frame,
+        decoded: Decoded,
+        now: Mono,
+        observer: &mut dyn Observer,
+    ) -> ControlFlow<()> {
+        if matches!(decoded, Decoded::Tpdo(_)) && !self.has_kept_early && self.synced.is_open(frame.id()) {
+            self.has_kept_early = true;
+            self.early_until = Some(now + FOREIGN_SECOND_SENDER_TIMEOUT);
+        } else if self.has_kept_early && self.early_until.is_some() && self.synced.is_settled() {
+            let samples = std::mem::take(&mut self.samples);
+            self.take_early(observer)?;
+            self.samples = samples;
+        }
+        ControlFlow::Continue(())
     }
 
     /// Passes the values of the first SYNC to the observer.

@@ -4,7 +4,7 @@ use crate::bus::ReceiveBuffer;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::pdo::TpdoNumber;
-use crate::master::SdoError;
+use crate::master::{SdoError, SecondAnswer};
 use crate::measure::expression::bind::BareLimit;
 use crate::measure::layout::NarrowValue;
 use crate::measure::sample::Doubt;
@@ -30,6 +30,8 @@ pub enum Remark {
     RepeatedTpdo(NodeId, TpdoNumber),
     /// A TPDO of the node arrives twice at a SYNC, with different values. It is ignored.
     TwoSenders(NodeId, TpdoNumber),
+    /// The node sent two answers to one request of another master.
+    SecondAnswer(NodeId, SecondAnswer),
     /// A value could not be polled.
     PollFailed(SdoError),
     /// The setup of the node changed while frames were lost. Rows within this time before the detection may be wrong.

@@ -40,8 +40,8 @@ pub(super) struct Questions {
 /// Why a recording has no rows.
 pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Failure {
     let within = waited(options);
-    if let Some((&node, &number)) = recording.two_senders.first_key_value() {
-        return Failure::at(node, LogFailure::TwoSenders(number));
+    if let Some(failure) = recording.two_devices.values().next() {
+        return failure.clone();
     }
     if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.values().min()) {
         return Failure::at(node, LogFailure::UnknownMapping);

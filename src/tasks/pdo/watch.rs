@@ -8,7 +8,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::Life;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::TpdoNumber;
-use crate::master::{Answer, Error, Happening, Master, SdoError, Ticket};
+use crate::master::{Answer, Error, Happening, Master, Operation, SdoError, SdoFailure, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::layout::Tpdo;
 use crate::measure::sample::{Sample, Source};
@@ -17,7 +17,7 @@ use crate::node::wait::{Policy, Until, Waiter, run};
 use crate::node::{Node, Overrides};
 use crate::tasks::Failure;
 use crate::tasks::diagnosis::{Findings, Heard, Inquiry, Silence, Situation, diagnose, questions};
-use crate::tasks::log::{LogFailure, SetupListener, changes, compare_values};
+use crate::tasks::log::{LogFailure, SetupListener, changes, compare_values, is_constant};
 use crate::tasks::synced::{Surplus, SyncedTpdos};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
@@ -93,7 +93,7 @@ pub fn watch(
         watcher.learn(setup, overrides);
         run(master, Policy::Record, &mut watcher)?;
         watcher.report_wrong_lengths();
-        return Ok(Vec::new());
+        return Ok(watcher.failures);
     }
     master.listen_to(nodes)?;
     let (mut surveyed, mut failures) = (Vec::new(), Vec::new());
@@ -218,11 +218,18 @@ impl<'a> Watcher<'a> {
             } else if let Some((node, Life::BootUp)) = Life::parse(&received.frame) {
                 setup.forget(node, &mut self.decoder);
             }
+            if let Some((node, object, answers)) = self.setup.as_mut().and_then(SetupListener::next_second_answer)
+                && answers.differs()
+                && is_constant(object)
+            {
+                let failure = SdoFailure::TwoDevices(Some(answers));
+                return self.exclude(SdoError { node, object, operation: Operation::Read, failure }.into(), node);
+            }
         }
         self.samples.clear();
         let decoded = self.decoder.decode(received, &mut self.samples);
         if matches!(decoded, Decoded::Tpdo(_) | Decoded::OtherFrame)
-            && let Some(surplus) = self.synced.take(&received.frame)
+            && let Some(surplus) = self.synced.take(&received.frame, at.mono)
         {
             return self.on_surplus(surplus);
         }
@@ -313,14 +320,19 @@ impl<'a> Watcher<'a> {
         match (is_new, differs) {
             (false, _) => ControlFlow::Continue(()),
             (true, false) => (self.on_event)(&WatchEvent::Repeated(node, number)),
-            (true, true) => {
-                let failure = Failure::at(node, LogFailure::TwoSenders(number));
-                self.failures.push(failure.clone());
-                self.nodes.retain(|other| other.id != node);
-                (self.on_event)(&WatchEvent::Failed(&failure))?;
-                if self.nodes.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            }
+            (true, true) => self.exclude(Failure::at(node, LogFailure::TwoSenders(number)), node),
         }
+    }
+
+    /// Ignores a node from now on.
+    fn exclude(&mut self, failure: Failure, node: NodeId) -> ControlFlow<()> {
+        self.nodes.retain(|other| other.id != node);
+        if let Some(setup) = &mut self.setup {
+            setup.exclude(node, &mut self.decoder);
+        }
+        self.failures.push(failure.clone());
+        (self.on_event)(&WatchEvent::Failed(&failure))?;
+        if self.nodes.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     /// Handles heartbeats, boot-up messages, emergencies and SYNC. They may explain missing TPDOs.

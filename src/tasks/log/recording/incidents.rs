@@ -7,13 +7,15 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::{Life, NmtCommand, NmtState};
-use crate::master::{Answer, Error, Master, SdoError, Ticket};
+use crate::canopen::object::ObjectId;
+use crate::master::{Answer, Error, Master, Operation, SdoError, SdoFailure, SecondAnswer, Ticket};
 use crate::node::Node;
+use crate::tasks::Failure;
 use crate::tasks::log::changes::changes;
 use crate::tasks::log::heartbeats::HeartbeatChange;
-use crate::tasks::log::passive::predefined_tpdo;
+use crate::tasks::log::passive::{is_constant, predefined_tpdo};
 use crate::tasks::log::rereads::{Reread, RereadReason, writes_setup};
-use crate::tasks::log::{Change, FIRST_SAMPLE_TIMEOUT, LogEvent, Mode, Observer, Remark};
+use crate::tasks::log::{Change, FIRST_SAMPLE_TIMEOUT, LogEvent, LogFailure, Mode, Observer, Remark};
 use crate::tasks::synced::Surplus;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -263,13 +265,41 @@ impl Recording<'_> {
             return ControlFlow::Continue(());
         }
         self.remark(Remark::TwoSenders(node, number), at, observer);
-        self.two_senders.insert(node, number);
+        self.exclude(Failure::at(node, LogFailure::TwoSenders(number)), node)
+    }
+
+    /// Handles two answers to one request of another master. If their difference makes the setup uncertain, the TPDOs of
+    /// the node are ignored from now on.
+    pub(super) fn second_answer(
+        &mut self,
+        node: NodeId,
+        object: ObjectId,
+        answers: SecondAnswer,
+        at: Stamp,
+        observer: &mut dyn Observer,
+    ) -> ControlFlow<()> {
+        self.remark(Remark::SecondAnswer(node, answers), at, observer);
+        if !answers.differs() || !is_constant(object) {
+            return ControlFlow::Continue(());
+        }
+        let failure = SdoFailure::TwoDevices(Some(answers));
+        self.exclude(SdoError { node, object, operation: Operation::Read, failure }.into(), node)
+    }
+
+    /// Ignores the TPDOs of a node from now on. Without another node, the recording ends.
+    fn exclude(&mut self, failure: Failure, node: NodeId) -> ControlFlow<()> {
+        self.two_devices.entry(node).or_insert(failure);
         let sources = self.decoder.sources();
         self.early.retain(|samples| samples.iter().all(|sample| sources[sample.source].node != node));
         self.liveness.remove(node);
-        self.decoder.pause(node);
-        // If no other node is left, the recording ends.
-        if self.liveness.nodes().next().is_none() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let has_others = match &mut self.listener {
+            Some(listener) => listener.exclude(node, &mut self.decoder),
+            None => {
+                self.decoder.pause(node);
+                self.liveness.nodes().next().is_some()
+            }
+        };
+        if has_others { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 
     /// Handles a TPDO whose length differs from its mapping.

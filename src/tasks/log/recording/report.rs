@@ -14,14 +14,12 @@ impl Recording<'_> {
     pub(in crate::tasks::log) fn report(mut self) -> RecordingReport {
         let lost = self.liveness.lost(self.tally.end());
         self.remark_at_end();
-        let two_senders = self.two_senders.iter();
-        let two_senders =
-            two_senders.map(|(&node, &number)| Failure::at(node, LogFailure::TwoSenders(number))).collect();
+        let two_devices = self.two_devices.values().cloned().collect();
         let replaced = self.replaced.iter().map(|&node| Failure::at(node, LogFailure::Replaced)).collect();
         let nothing = (self.tally.rows == 0).then(|| why_nothing(&self, self.options));
         RecordingReport {
             failed: Vec::new(),
-            two_senders,
+            two_devices,
             replaced,
             rows: self.tally.rows,
             length: self.tally.length(),

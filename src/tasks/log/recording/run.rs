@@ -74,13 +74,15 @@ impl Recording<'_> {
         for node in &self.nodes {
             self.liveness.watch_heartbeat(node, self.options.mode, start);
         }
+        if self.poll.is_none() {
+            self.nodes.iter().for_each(|node| self.synced.set_up(node));
+        }
         let mut producer = match self.options.mode {
             Mode::Sync(interval) | Mode::Request(interval) => {
                 let id = self.nodes.first().map_or(CanId::SYNC, |first| first.sync);
                 let id = self.sync_interval().map(|_| id);
                 let overflow = self.nodes.first().and_then(|first| first.sync_overflow);
                 self.due.set_up(&self.nodes, &self.decoder, self.options.mode);
-                self.nodes.iter().for_each(|node| self.synced.set_up(node));
                 Some(Producer::new(interval, id, overflow, start))
             }
             _ => None,
@@ -150,7 +152,7 @@ impl Recording<'_> {
                 if producer.slot() == 0 {
                     self.early_until = Some(now + interval.min(SECOND_SENDER_TIMEOUT));
                 }
-                self.nodes.iter().map(|node| node.sync).take(1).for_each(|id| self.synced.on_sync(id));
+                self.nodes.iter().map(|node| node.sync).take(1).for_each(|id| self.synced.on_sync(id, now));
             }
             producer.send(master);
             if is_free {
