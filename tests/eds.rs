@@ -78,7 +78,7 @@ fn every_file_is_tested_and_names_its_origin() {
             }
         }
     }
-    assert_eq!(files, 32);
+    assert_eq!(files, 37);
 }
 
 #[test]
@@ -325,6 +325,22 @@ fn leading_zeros() {
     assert_eq!([default(&eds, "zero"), default(&eds, "seven")], [integer(0), integer(7)]);
     assert_eq!([default(&eds, "octal"), default(&eds, "not-octal")], [integer(64), integer(89)]);
     assert_eq!((entry(&eds, "real").data_type, default(&eds, "real")), (DataType::Real32, Some(Scalar::Real(10.0))));
+}
+
+#[test]
+fn devices_of_other_profiles() {
+    for (name, profile, value, entries) in [
+        ("33-inclinometer.eds", 410, "slope-long16", 2),
+        ("34-encoder.eds", 406, "speed-value-channel-1", 2),
+        ("35-inputs.eds", 401, "oil-temperature", 3),
+        ("36-drive.eds", 402, "statusword", 2),
+        ("37-transmitter.eds", 404, "ai-status-1", 3),
+    ] {
+        let eds = load(name, &[]);
+        assert_eq!(number(&eds.dictionary, 0x1000, 0, 5).map(|device_type| device_type & 0xffff), Some(profile));
+        assert_eq!(mapping(&eds.dictionary, 1).len(), entries, "{name}");
+        assert!(entry(&eds, value).pdo, "{name}");
+    }
 }
 
 #[test]

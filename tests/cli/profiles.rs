@@ -106,6 +106,8 @@ fn encoders_show_position_and_speed() {
     let steps = [("0x6005:0", "u8", "ro", "2"), ("0x6005:1", "u32", "rw", "5000"), ("0x6005:2", "u32", "rw", "10")];
     let bench = self::bench(&device("0x00080196", &[&rotary[..], &steps[..]].concat(), &mapping));
     assert_eq!(values(bench.run("read 5")), ["5 position-value 20.480 mm", "5 speed-value:1 -0.7 mm/s"]);
+    let page = bench.run("info 5").exit(0);
+    assert!(page.stdout.contains("20.480 mm") && !page.stdout.contains("range"), "{}", page.stdout);
     let log = bench.run("log 5 --sync 100ms --count 2").exit(0);
     assert_eq!(rows(&log.stdout, 2), ["position-value,20.480,mm,", "speed-value:1,-0.7,mm/s,"]);
 }

@@ -15,6 +15,7 @@ import commands
 import disturbance
 import keeping
 import mapping
+import profiles
 import recording
 from harness import run_checks
 
@@ -22,7 +23,7 @@ from harness import run_checks
 def main():
     binary, interface, *rest = sys.argv[1:]
     pair = rest.pop(0).split(":") if rest and ":" in rest[0] else None
-    checks = [(check, ()) for check in commands.CHECKS + keeping.CHECKS + mapping.CHECKS + recording.CHECKS + disturbance.CHECKS]
+    checks = [(check, ()) for check in commands.CHECKS + keeping.CHECKS + mapping.CHECKS + profiles.CHECKS + recording.CHECKS + disturbance.CHECKS]
     if pair:
         checks += [(check, pair) for check in disturbance.PAIR_CHECKS]
     else:

@@ -178,7 +178,7 @@ impl Selection {
             .chain(self.dates.iter().flatten().flatten().copied())
             .chain((0..=4).map(|sub| STORE.with_sub(sub)))
             .chain(self.inhibit.iter().copied())
-            .chain(node.signals.iter().flat_map(|signal| span(node, signal)))
+            .chain(node.signals.iter().filter_map(|signal| span(node, signal)).flatten())
             .filter(|&object| node.may_have(object))
             .collect();
         let all: Vec<ObjectId> = all.into_iter().collect();
@@ -212,7 +212,7 @@ pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Info, Failure> {
     let Selection { communication, channels, own, dates, inhibit } = selection;
     let [calibrated, produced] = dates.map(|objects| page::date(&values, objects?));
     let channels = node.signals.iter().zip(channels).zip(samples).map(|((signal, objects), sample)| Channel {
-        range: page::range(&values, signal, span(node, signal)),
+        range: span(node, signal).and_then(|ends| page::range(&values, signal, ends)),
         settings: objects.into_iter().filter_map(|object| setting(Some(signal), object)).collect(),
         signal: signal.clone(),
         sample,
@@ -299,16 +299,14 @@ fn own(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
     own
 }
 
-/// The objects with the start and the end of the measuring range.
-fn span(node: &Node, signal: &Signal) -> [ObjectId; 2] {
+/// The objects with the start and the end of the measuring range, if the signal can have them.
+fn span(node: &Node, signal: &Signal) -> Option<[ObjectId; 2]> {
     let described = node.model.as_ref().map_or(&[][..], |model| &model.description.signals);
     let entry = described.iter().find(|entry| entry.name == signal.name);
-    if !signal.has_channel() && entry.is_none() {
-        return [signal.value_object.0; 2];
-    }
-    let start = entry.and_then(|entry| entry.span_start).unwrap_or_else(|| node.in_family(signal, 0x148));
-    let end = entry.and_then(|entry| entry.span_end).unwrap_or_else(|| node.in_family(signal, 0x149));
-    [start, end]
+    let of_channel = |low| signal.has_channel().then(|| node.in_family(signal, low));
+    let start = entry.and_then(|entry| entry.span_start).or_else(|| of_channel(0x148))?;
+    let end = entry.and_then(|entry| entry.span_end).or_else(|| of_channel(0x149))?;
+    Some([start, end])
 }
 
 /// The present values. A value is `None` if it cannot be read.
