@@ -18,7 +18,7 @@ const PARTS: usize = 20;
 /// From the lowest to the highest value.
 const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// The signals of a node in one line, if it has more than these.
+/// The signals of a node in one line, if it has more than these. On a narrow terminal, half or a quarter of them.
 const SIGNALS_IN_LINE: usize = 8;
 
 /// What is known about a running recording.
@@ -157,7 +157,13 @@ impl LiveTable {
         let (many, few): (Vec<u8>, Vec<u8>) = nodes.into_iter().partition(|&node| of(node).count() > SIGNALS_IN_LINE);
         let mut lines = rows(&few.into_iter().flat_map(of).collect::<Vec<_>>(), now, width);
         for node in many {
-            lines.extend(compact(&of(node).collect::<Vec<_>>(), now));
+            let signals: Vec<&LiveSignal> = of(node).collect();
+            let mut in_line = SIGNALS_IN_LINE;
+            let is_wide = |in_line| compact(&signals, now, in_line).iter().any(|line| length(line) >= width);
+            while in_line > 2 && is_wide(in_line) {
+                in_line /= 2;
+            }
+            lines.extend(compact(&signals, now, in_line));
         }
         lines
     }
@@ -234,13 +240,13 @@ fn rows(signals: &[&LiveSignal], now: Mono, width: usize) -> Vec<Line> {
     std::iter::once(head).chain(signals.iter().enumerate().map(row)).collect()
 }
 
-/// Eight signals of one node in a line: `3  ch1-ch8  20.1  20.4 …  degC  ok  10.0/s`.
-fn compact(signals: &[&LiveSignal], now: Mono) -> Vec<Line> {
+/// Some signals of one node in each line: `3  ch1-ch8  20.1  20.4 …  degC  ok  10.0/s`.
+fn compact(signals: &[&LiveSignal], now: Mono, in_line: usize) -> Vec<Line> {
     let mut values: Vec<String> = signals.iter().map(|signal| signal.value()).collect();
     align_decimals(&mut values);
     let width = values.iter().map(|value| value.chars().count()).max().unwrap_or(0);
     let names: Vec<String> = signals
-        .chunks(SIGNALS_IN_LINE)
+        .chunks(in_line)
         .map(|chunk| match chunk {
             [first, .., last] => format!("{}-{}", first.name, last.name),
             _ => chunk.iter().map(|signal| signal.name.as_str()).collect(),
@@ -248,10 +254,10 @@ fn compact(signals: &[&LiveSignal], now: Mono) -> Vec<Line> {
         .collect();
     let widest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
     let mut lines = Vec::new();
-    for (number, chunk) in signals.chunks(SIGNALS_IN_LINE).enumerate() {
+    for (number, chunk) in signals.chunks(in_line).enumerate() {
         let node = if number == 0 { chunk[0].node.to_string() } else { String::new() };
         let mut line = vec![(format!("{node:>4}  {:<widest$}", names[number]), Style::new())];
-        for (signal, value) in chunk.iter().zip(&values[number * SIGNALS_IN_LINE..]) {
+        for (signal, value) in chunk.iter().zip(&values[number * in_line..]) {
             let style = if signal.status.is_none_or(|status| status == Status::Ok) {
                 Style::new()
             } else {
@@ -298,9 +304,15 @@ fn status_line(counts: &LiveCounts) -> Line {
     line
 }
 
-/// The text of a line, at most `width` characters, with its styles if `color`.
+/// The number of characters of a line.
+fn length(line: &Line) -> usize {
+    line.iter().map(|(part, _)| part.chars().count()).sum()
+}
+
+/// The text of a line, at most `width` characters, with its styles if `color`. A cut line ends with `…`.
 fn cut(line: Line, width: usize, color: bool) -> String {
-    let (mut text, mut left) = (String::new(), width);
+    let is_cut = length(&line) > width;
+    let (mut text, mut left) = (String::new(), width.saturating_sub(usize::from(is_cut)));
     for (part, style) in line {
         let part: String = part.chars().take(left).collect();
         left -= part.chars().count();
@@ -310,7 +322,9 @@ fn cut(line: Line, width: usize, color: bool) -> String {
             text.push_str(&part);
         }
     }
-    text.trim_end().to_owned()
+    text.truncate(text.trim_end().len());
+    text.extend(is_cut.then_some('…'));
+    text
 }
 
 #[cfg(test)]
@@ -384,8 +398,22 @@ mod tests {
                 assert!(lines.len() < height && lines.iter().all(|line| line.chars().count() < width), "{lines:?}");
             }
         }
-        assert_eq!(lines(&table, 80, 4)[2], "17 more lines");
+        assert_eq!(lines(&table, 80, 4)[2], "19 more lines");
         assert!(!lines(&table, 60, 24)[1].contains("LAST MINUTE"));
+        let status_line = &lines(&table, 30, 24)[0];
+        assert_eq!(status_line, "00:00:00   1,234 rows   0/s…");
+    }
+
+    #[test]
+    fn narrow_terminal_has_fewer_values_in_each_line() {
+        let at = |width: usize| lines(&table(&[(3, 16)]), width, 60);
+        for (width, count) in [(120, 2), (80, 4), (64, 8), (40, 8)] {
+            let lines = at(width);
+            assert_eq!(lines.len(), 1 + count, "{width}: {lines:?}");
+            assert!(lines.concat().contains("320.9"), "{width}: {lines:?}");
+            assert!(width < 64 || !lines[1..].concat().contains('…'), "{width}: {lines:?}");
+        }
+        assert_eq!(at(40)[2], "      ch3-ch4     60.9   80.9  degC  c…");
     }
 
     #[test]
