@@ -208,7 +208,8 @@ impl Check {
         waited: StdDuration,
     ) -> anyhow::Result<CheckReport> {
         let duration = self.duration.map(|duration| duration.0.saturating_sub(waited));
-        let progress = CheckProgress::new(duration.is_some() && global.shows_progress(), duration.unwrap_or_default());
+        let (shows, color) = (duration.is_some() && global.shows_progress(), global.console().color);
+        let progress = CheckProgress::new(shows, color, duration.unwrap_or_default());
         let console = Console { progress: Some(progress.multi()), ..global.console() };
         global.with_claims(|master, claims| {
             // A replayed recording is receive-only, and is checked from its start to its end.

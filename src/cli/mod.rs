@@ -50,7 +50,7 @@ pub(crate) use crate::output::failure::ErrorMessage;
 use crate::output::notes::undone_text;
 use crate::output::report::{Format, Report, Stream, render};
 use crate::tasks::journal::Journal;
-use anstream::ColorChoice;
+use anstream::{AutoStream, ColorChoice};
 use args::{BusSpec, Channel, Duration, Override};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use descriptions::Named;
@@ -316,7 +316,10 @@ impl Global {
 
     /// Prints reports to stdout in the chosen format.
     pub(crate) fn print<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
-        render(reports, self.format, &mut exit::open_stdout()?.lock()).map_err(exit::stdout)
+        let stdout = exit::open_stdout()?;
+        // Only text has colours. Data is not changed.
+        let color = if self.prints_text() { self.console().color } else { ColorChoice::AlwaysAnsi };
+        render(reports, self.format, &mut AutoStream::new(stdout, color).lock()).map_err(exit::stdout)
     }
 
     /// Prints reports as JSON or CSV; for text, the output of `text`.

@@ -1,8 +1,10 @@
 //! The live lines of a check: one line per expression, with the latest values.
 
-use super::progress::{REDRAWS_PER_SECOND, bar, style};
-use super::verdict::values;
-use crate::measure::expression::verdict::LiveResult;
+use super::progress::{REDRAWS_PER_SECOND, bar, has_color, style};
+use super::verdict::{values, word};
+use crate::measure::expression::verdict::{LiveResult, Outcome};
+use anstream::ColorChoice;
+use anstyle::Style;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget};
 use std::io::{self, Write};
 use std::time::Duration;
@@ -13,17 +15,18 @@ pub struct CheckProgress {
     multi: MultiProgress,
     lines: Vec<ProgressBar>,
     total: ProgressBar,
+    color: bool,
     duration: Duration,
 }
 
 impl CheckProgress {
     /// Live lines for a check of `duration`. Hidden unless `show`.
-    pub fn new(show: bool, duration: Duration) -> CheckProgress {
+    pub fn new(show: bool, color: ColorChoice, duration: Duration) -> CheckProgress {
         let target =
             if show { ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_SECOND) } else { ProgressDrawTarget::hidden() };
         let multi = MultiProgress::with_draw_target(target);
         let total = bar(&multi, u64::try_from(duration.as_millis()).unwrap_or(u64::MAX));
-        CheckProgress { multi, lines: Vec::new(), total, duration }
+        CheckProgress { multi, lines: Vec::new(), total, color: has_color(color), duration }
     }
 
     /// The display, so that other lines on stderr are printed above it.
@@ -44,11 +47,10 @@ impl CheckProgress {
             self.lines.push(line);
         }
         for (line, result) in self.lines.iter().zip(results) {
-            line.set_prefix(match result.is_satisfied {
-                Some(true) => "ok",
-                Some(false) => "FAIL",
-                None => "-",
-            });
+            let outcome = result.is_satisfied.map(|is_ok| if is_ok { Outcome::Ok } else { Outcome::Fail });
+            let (text, style) = outcome.map_or(("-", Style::new()), word);
+            let style = if self.color { style } else { Style::new() };
+            line.set_prefix(format!("{style}{text}{style:#}"));
             let node = result.node.map(|node| format!("{node}  ")).unwrap_or_default();
             let latest: Vec<Option<f64>> = result.values.iter().map(|value| value.value).collect();
             line.set_message(format!("{node}{}  {}", result.text, values(&result.values, &latest)));

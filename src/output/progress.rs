@@ -43,8 +43,7 @@ impl Progress {
         let multi = MultiProgress::with_draw_target(target);
         let lines = multi.add(ProgressBar::new_spinner());
         lines.set_style(style("{msg}"));
-        let has_color = |choice| choice != ColorChoice::Never;
-        let color = has_color(color) && has_color(AutoStream::choice(&io::stderr())) || color == ColorChoice::Always;
+        let color = has_color(color);
         let (table, drawn) = (LiveTable::default(), (0, Vec::new()));
         Progress { multi, lines, table, color, drawn, second: (Duration::ZERO, 0), rows_per_second: 0.0 }
     }
@@ -235,6 +234,14 @@ pub(super) fn bar(multi: &MultiProgress, length: u64) -> ProgressBar {
     let bar = multi.add(ProgressBar::new(length));
     bar.set_style(style("[{bar:27}] {msg}").progress_chars("=> "));
     bar
+}
+
+/// Whether stderr shows colours.
+pub(super) fn has_color(choice: ColorChoice) -> bool {
+    match choice {
+        ColorChoice::Auto => AutoStream::choice(&io::stderr()) != ColorChoice::Never,
+        choice => choice != ColorChoice::Never,
+    }
 }
 
 /// The style of a line.

@@ -8,6 +8,7 @@ use crate::measure::expression::verdict::{Outcome, QuantityValue, Reason, Verdic
 use crate::measure::sample::{Number, Status};
 use crate::tasks::Failure;
 use crate::tasks::check::CheckReport;
+use anstyle::{AnsiColor, Style};
 use std::io::{self, Write};
 
 /// Significant digits of a calculated value.
@@ -16,12 +17,12 @@ const CALCULATED_DIGITS: usize = 7;
 /// The longest text of an exact value. Longer values are rounded.
 const MAX_EXACT_LENGTH: usize = 11;
 
-/// The word for an outcome in text output.
-fn word(outcome: Outcome) -> &'static str {
+/// The word for an outcome in text output, and its style.
+pub(super) fn word(outcome: Outcome) -> (&'static str, Style) {
     match outcome {
-        Outcome::Ok => "ok",
-        Outcome::Fail => "FAIL",
-        Outcome::NoData => "none",
+        Outcome::Ok => ("ok", AnsiColor::Green.on_default()),
+        Outcome::Fail => ("FAIL", AnsiColor::Red.on_default().bold()),
+        Outcome::NoData => ("none", AnsiColor::Yellow.on_default().bold()),
     }
 }
 
@@ -169,13 +170,20 @@ impl Report for VerdictRow<'_> {
         let row = |row: &VerdictRow<'_>| {
             let VerdictRow { verdict, failures } = row;
             let node = verdict.node.map_or_else(|| "-".to_owned(), |node| node.to_string());
-            let mut cells = vec![format!("{:<4}", word(verdict.outcome))];
+            let mut cells = vec![format!("{:<4}", word(verdict.outcome).0)];
             cells.extend(has_several_nodes.then_some(node));
             cells.extend([verdict.text.clone(), findings(verdict, failures)]);
             cells
         };
         let rows: Vec<Vec<String>> = reports.iter().map(row).collect();
-        write(out, &[Align::Left; 4][..if has_several_nodes { 4 } else { 3 }], &rows)
+        let mut table = Vec::new();
+        write(&mut table, &[Align::Left; 4][..if has_several_nodes { 4 } else { 3 }], &rows)?;
+        for (line, row) in String::from_utf8_lossy(&table).lines().zip(reports) {
+            let (word, style) = word(row.verdict.outcome);
+            let rest = line.strip_prefix(word).unwrap_or(line);
+            writeln!(out, "{style}{word}{style:#}{rest}")?;
+        }
+        Ok(())
     }
 }
 
