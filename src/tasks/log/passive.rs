@@ -93,7 +93,7 @@ impl SetupListener {
     }
 
     /// The number in an object: from the SDO traffic, else the default in the description that the user named.
-    fn number(&self, node: NodeId, object: ObjectId) -> Option<u32> {
+    pub(in crate::tasks) fn number(&self, node: NodeId, object: ObjectId) -> Option<u32> {
         let default = || first_four(&self.named(node)?.dictionary.get(object)?.default_bytes(node)?).into();
         self.overheard.number(node, object).or_else(default)
     }

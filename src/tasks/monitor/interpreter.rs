@@ -8,7 +8,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss;
 use crate::canopen::nmt::{Life, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
-use crate::canopen::pdo::TpdoNumber;
+use crate::canopen::pdo::{CobId, TpdoNumber};
 use crate::canopen::sdo::{FitError, Note, Uploaded, fit};
 use crate::canopen::value::{DataType, Value};
 use crate::device::description::emergency_text;
@@ -26,6 +26,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// TIME in the predefined connection set (CiA 301, 7.3.3).
 const TIME: CanId = CanId::Standard(0x100);
 
+/// The COB-ID of TIME.
+const COB_ID_TIME: ObjectId = ObjectId::new(0x1012, 0);
+
 /// Interprets the frames on a bus.
 pub struct Interpreter {
     setup: SetupListener,
@@ -35,6 +38,7 @@ pub struct Interpreter {
     nodes: BTreeMap<NodeId, Node>,
     tpdos: BTreeMap<CanId, TpdoNumber>,
     syncs: BTreeSet<CanId>,
+    times: BTreeSet<CanId>,
     emergencies: BTreeMap<CanId, NodeId>,
     /// The last state of each node by heartbeat.
     states: BTreeMap<NodeId, NmtState>,
@@ -67,6 +71,7 @@ impl Interpreter {
             nodes: BTreeMap::new(),
             tpdos: BTreeMap::new(),
             syncs: [CanId::SYNC].into(),
+            times: [TIME].into(),
             emergencies: all.iter().map(|&node| (CanId::emergency(node), node)).collect(),
             states: BTreeMap::new(),
             guarding: BTreeMap::new(),
@@ -152,6 +157,7 @@ impl Interpreter {
     fn learn(&mut self, id: NodeId) {
         let node = self.setup.known_node(id);
         self.syncs.insert(node.sync);
+        self.times.extend(self.setup.number(id, COB_ID_TIME).map(|word| CobId(word).can_id()));
         if node.emergency != CanId::emergency(id) {
             self.emergencies.insert(node.emergency, id);
         }
@@ -188,7 +194,7 @@ impl Interpreter {
             &[counter] if self.syncs.contains(&frame.id()) => {
                 Some((None, FrameKind::Sync, Content::Sync(Some(counter))))
             }
-            data if frame.id() == TIME => {
+            data if self.times.contains(&frame.id()) => {
                 let time = DataType::TimeOfDay.decode(data).ok()?;
                 Some((None, FrameKind::Time, Content::Time(time)))
             }

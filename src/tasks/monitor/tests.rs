@@ -25,6 +25,17 @@ fn repeated_heartbeats_and_guarding_are_marked() {
     assert_eq!(guarding[5].content, Content::Guarded(crate::canopen::nmt::NmtState::PreOperational, false));
 }
 
+#[test]
+fn time_has_the_cob_id_of_1012h() {
+    let kinds = |frames: &[&str]| -> Vec<FrameKind> { entries(frames).iter().map(|entry| entry.kind).collect() };
+    let time = "102#60E316004301";
+    assert_eq!(kinds(&[time, &time.replace("102", "100")]), [FrameKind::Other, FrameKind::Time]);
+    let other = FrameKind::Sdo;
+    assert_eq!(kinds(&["605#4012100000000000", "585#4312100002010080", time]), [other, FrameKind::Time], "read");
+    assert_eq!(kinds(&["605#2312100002010040", "585#6012100000000000", time]), [other, FrameKind::Time], "written");
+    assert_eq!(kinds(&["605#2312100002010040", "585#8012100030000906", time]), [other, FrameKind::Other], "rejected");
+}
+
 /// Every frame is in a message or in an SDO transfer, and no frame panics.
 #[test]
 fn random_frames_are_shown() {
