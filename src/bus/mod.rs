@@ -346,6 +346,9 @@ pub enum BusError {
     /// This bus can only receive.
     #[error("{0} can only receive")]
     ReceiveOnly(String),
+    /// The interface is in listen-only mode.
+    #[error("{0} is in listen-only mode: it can only receive")]
+    ListenOnly(String),
     /// The interface does not support the bit rate. Its old settings are restored.
     #[error("{name} does not support {bit_rate} bit/s: {why}")]
     BitRate {

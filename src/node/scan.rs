@@ -2,7 +2,7 @@
 
 use super::overheard::Overheard;
 use super::wait::{Policy, wait};
-use crate::bus::{Filters, Mono, Received};
+use crate::bus::{Fault, Filters, Mono, Received};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::{Life, NmtState};
@@ -37,6 +37,8 @@ pub struct Presence {
     /// The objects that other masters read and wrote, in a passive scan.
     pub overheard: Overheard,
     booted: BTreeSet<NodeId>,
+    /// The faults that the controller reported meanwhile, each once.
+    pub faults: Vec<Fault>,
 }
 
 impl Presence {
@@ -48,6 +50,21 @@ impl Presence {
     /// The state of a node, if a heartbeat showed it.
     pub fn state(&self, node: NodeId) -> Option<NmtState> {
         self.states.get(&node).copied().flatten()
+    }
+
+    fn on_event(&mut self, event: &Happening) {
+        match event {
+            Happening::Frame(received) => self.on_frame(received),
+            Happening::Fault(fault, _) => self.on_fault(*fault),
+            _ => {}
+        }
+    }
+
+    /// Adds a fault of the controller.
+    pub fn on_fault(&mut self, fault: Fault) {
+        if fault != Fault::ErrorActive && !self.faults.contains(&fault) {
+            self.faults.push(fault);
+        }
     }
 
     fn on_frame(&mut self, received: &Received) {
@@ -163,8 +180,7 @@ fn ask(
                         return ControlFlow::Break(());
                     }
                 }
-                Happening::Frame(received) => presence.on_frame(&received),
-                _ => {}
+                event => presence.on_event(&event),
             }
             ControlFlow::Continue(())
         })?;
@@ -186,13 +202,8 @@ fn wait_for_states(master: &mut Master<'_>, until: Mono, presence: &mut Presence
         return Ok(());
     }
     wait(master, until, Policy::Command, |_, event| {
-        if let Happening::Frame(received) = event {
-            presence.on_frame(&received);
-            if is_complete(presence) {
-                return ControlFlow::Break(());
-            }
-        }
-        ControlFlow::Continue(())
+        presence.on_event(&event);
+        if is_complete(presence) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     Ok(())
 }
@@ -206,8 +217,9 @@ pub fn listen(master: &mut Master<'_>, duration: Duration) -> Result<Presence, E
     let mut presence = Presence::default();
     let until = master.now() + duration;
     wait(master, until, Policy::Observe, |_, event| {
-        if let Happening::Frame(received) = event {
-            presence.on_any_frame(&received);
+        match event {
+            Happening::Frame(received) => presence.on_any_frame(&received),
+            event => presence.on_event(&event),
         }
         ControlFlow::<()>::Continue(())
     })?;

@@ -151,14 +151,14 @@ pub fn examine(master: &mut Master<'_>, options: &DoctorOptions) -> Result<Exami
 fn examine_bus(master: &mut Master<'_>, options: &DoctorOptions, examination: &mut Examination) -> Result<(), Failure> {
     let asked: Vec<NodeId> = options.node.map_or_else(|| NodeId::all().collect(), |node| vec![node]);
     master.listen(&Filters::All)?;
-    let presence = if options.passive {
+    let mut presence = if options.passive {
         scan::listen(master, LISTEN)?
     } else {
         scan::find(master, &asked, options.timeout, options.rounds)?
     };
     let found: Vec<NodeId> = presence.nodes().into_iter().filter(|node| asked.contains(node)).collect();
     if found.is_empty() {
-        return why_absent(master, options, &presence, examination);
+        return why_absent(master, options, presence, examination);
     }
     let (answering, silent): (Vec<NodeId>, Vec<NodeId>) =
         found.iter().partition(|&node| options.passive || presence.answered.contains(node));
@@ -169,7 +169,7 @@ fn examine_bus(master: &mut Master<'_>, options: &DoctorOptions, examination: &m
     if answering.is_empty() {
         return Ok(());
     }
-    record(master, options, &answering, &presence, examination)?;
+    record(master, options, &answering, &mut presence, examination)?;
     if options.passive { Ok(()) } else { read_values(master, options, &answering, examination) }
 }
 
@@ -197,11 +197,12 @@ fn is_stopped(error: &SdoError) -> bool {
 fn why_absent(
     master: &mut Master<'_>,
     options: &DoctorOptions,
-    presence: &Presence,
+    mut presence: Presence,
     examination: &mut Examination,
 ) -> Result<(), Failure> {
     let mut others = presence.nodes();
-    let (frames, faults) = observe(master, Duration::from_secs(1))?;
+    let frames = observe(master, Duration::from_secs(1), &mut presence)?;
+    let faults = presence.faults;
     let is_alone = others.is_empty() && frames == 0;
     faults.iter().for_each(|&fault| examination.add(None, FindingCause::Fault(fault, false)));
     if let Some(node) = options.node.filter(|_| !options.passive) {
@@ -232,19 +233,19 @@ fn why_absent(
 }
 
 /// Counts frames and collects the faults of the controller.
-fn observe(master: &mut Master<'_>, duration: Duration) -> Result<(u64, Vec<Fault>), Error> {
+fn observe(master: &mut Master<'_>, duration: Duration, presence: &mut Presence) -> Result<u64, Error> {
     master.listen(&Filters::All)?;
-    let (mut frames, mut faults) = (0, Vec::new());
+    let mut frames = 0;
     let until = master.now() + duration;
     wait(master, until, Policy::Observe, |_, event| {
         match event {
             Happening::Frame(_) => frames += 1,
-            Happening::Fault(fault, _) if fault != Fault::ErrorActive && !faults.contains(&fault) => faults.push(fault),
+            Happening::Fault(fault, _) => presence.on_fault(fault),
             _ => {}
         }
         ControlFlow::<()>::Continue(())
     })?;
-    Ok((frames, faults))
+    Ok(frames)
 }
 
 /// Records the TPDOs of the nodes until each signal has a value.
@@ -252,7 +253,7 @@ fn record(
     master: &mut Master<'_>,
     options: &DoctorOptions,
     nodes: &[NodeId],
-    presence: &Presence,
+    presence: &mut Presence,
     examination: &mut Examination,
 ) -> Result<(), Failure> {
     let recording = LogOptions {
@@ -292,7 +293,8 @@ fn record(
     if report.interrupted {
         return Err(Error::Interrupted.into());
     }
-    watch.faults.iter().for_each(|&fault| examination.add(None, FindingCause::Fault(fault, true)));
+    watch.faults.into_iter().for_each(|fault| presence.on_fault(fault));
+    presence.faults.iter().for_each(|&fault| examination.add(None, FindingCause::Fault(fault, true)));
     report.failed.into_iter().chain(nothing).for_each(|failure| examination.failed(failure));
     for remark in report.remarks {
         match remark {
@@ -365,10 +367,7 @@ impl Observer for Watch {
     }
 
     fn event(&mut self, event: &LogEvent, _at: Stamp) {
-        if let LogEvent::Fault(fault) = *event
-            && fault != Fault::ErrorActive
-            && !self.faults.contains(&fault)
-        {
+        if let LogEvent::Fault(fault) = *event {
             self.faults.push(fault);
         }
     }

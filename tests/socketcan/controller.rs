@@ -1,7 +1,7 @@
 //! Interfaces with bit rates: two controllers on one bus, emulated by QEMU (`tests/socketcan/qemu`). There, frames pass
 //! at any bit rate.
 
-use crate::program::{cangauge, command, setting, shown, without_the_right};
+use crate::program::{Devices, cangauge, command, setting, shown, without_the_right};
 use crate::{assert_nothing_more, frame, next, next_frame, run};
 use cangauge::bus::socketcan::SocketCan;
 use cangauge::bus::{BitRateControl, Bus, BusError, Mode};
@@ -244,4 +244,39 @@ fn an_interrupted_detection_restores_the_interface() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
     assert_eq!(setting("can0"), before);
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn doctor_names_the_state_of_the_controller() {
+    let _alone = controllers();
+    let finding = || {
+        let done = cangauge("-b can0 doctor 5 --format json");
+        let finding: Value = serde_json::from_str(&done.stdout).unwrap_or_default();
+        let text = |name: &str| finding[name].as_str().unwrap_or_default().to_owned();
+        (done.code, text("message"), text("hint"))
+    };
+    let found = |message: &str, hint: &str| (Some(1), message.to_owned(), hint.to_owned());
+    let bring_up = "bring it up: sudo cangauge bus up can0 250k (use the sensors' bit rate)";
+    assert_eq!(finding(), found("interface can0 is down", bring_up));
+    ip("can0 up type can bitrate 125000 listen-only on");
+    let leave = "leave this mode: sudo cangauge bus up can0 250k (use the sensors' bit rate)";
+    assert_eq!(finding(), found("can0 is in listen-only mode: it can only receive", leave));
+    // Listening works.
+    assert_eq!(cangauge("-b can0 -t 100ms scan --passive").code, Some(3));
+    cangauge("bus up can0 125k");
+    let _devices = Devices::new("can1", "mh4@5");
+    assert!(finding().1.starts_with("TPDO1 waits for SYNC"), "{:?}", finding());
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn health_reads_the_error_counters() {
+    let _alone = controllers();
+    ip("can0 up");
+    let done = cangauge("-b can0 health --passive --for 1s --format csv");
+    for row in [",bus.state,", ",bus.tx-errors,0,", ",bus.rx-errors,0,", ",bus.bitrate,125000,"] {
+        assert!(done.stdout.lines().any(|line| line.contains(row)), "{row}: {done:?}");
+    }
+    assert!(done.stdout.contains("error-active"), "{done:?}");
 }

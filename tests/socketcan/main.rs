@@ -9,6 +9,7 @@
 #![cfg(target_os = "linux")]
 
 mod controller;
+mod doctor;
 mod frames;
 mod link;
 mod load;

@@ -1,7 +1,8 @@
 //! Runs the program, and reads interfaces with `ip`.
 
 use serde_json::Value;
-use std::process::{Command, Output, Stdio};
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Output, Stdio};
 
 /// The result of a command.
 #[derive(Debug)]
@@ -57,4 +58,24 @@ pub(crate) fn setting(name: &str) -> (bool, Value, Value) {
     let up = shown["flags"].as_array().unwrap().iter().any(|flag| flag == "UP");
     let data = &mut shown["linkinfo"]["info_data"];
     (up, data["bittiming"].take(), serde_json::json!([data["ctrlmode"], data["restart_ms"]]))
+}
+
+/// Simulated devices on an interface. They end when the value is dropped.
+pub(crate) struct Devices(Child);
+
+impl Devices {
+    pub(crate) fn new(bus: &str, devices: &str) -> Devices {
+        let mut child = command(&format!("sim {devices} -b {bus}")).stderr(Stdio::piped()).spawn().unwrap();
+        // It prints a line when the devices are ready.
+        let mut line = String::new();
+        BufReader::new(child.stderr.take().unwrap()).read_line(&mut line).unwrap();
+        Devices(child)
+    }
+}
+
+impl Drop for Devices {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }

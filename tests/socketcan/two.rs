@@ -1,30 +1,10 @@
 //! Two programs that use the same node.
 
-use super::program::{Done, cangauge, command};
+use super::program::{Devices, Done, cangauge, command};
 use super::{Can, run};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-
-/// Simulated devices on the interface. They end when the value is dropped.
-struct Devices(Child);
-
-impl Devices {
-    fn new(can: &Can) -> Devices {
-        let mut child = command(&format!("sim mh4@5,dps@6 -b {}", can.name)).stderr(Stdio::piped()).spawn().unwrap();
-        // It prints a line when the devices are ready.
-        let mut line = String::new();
-        BufReader::new(child.stderr.take().unwrap()).read_line(&mut line).unwrap();
-        Devices(child)
-    }
-}
-
-impl Drop for Devices {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
 
 /// A program that polls node 5 until it is stopped. It has already started.
 fn poller(can: &Can) -> Child {
@@ -55,7 +35,7 @@ fn end(mut child: Child) -> Done {
 #[ignore = "needs a CAN interface: tests/socketcan/run"]
 fn a_second_program_waits_and_then_works() {
     let can = Can::get();
-    let _devices = Devices::new(&can);
+    let _devices = Devices::new(&can.name, "mh4@5,dps@6");
     let first = poller(&can);
     // Another node is free.
     cangauge(&format!("sdo read 6 0x1018:1 -b {}", can.name)).is(0, "866\n", "");
@@ -76,7 +56,7 @@ fn a_second_program_waits_and_then_works() {
 #[ignore = "needs a CAN interface: tests/socketcan/run"]
 fn a_wait_ends_after_ten_seconds_or_with_ctrl_c() {
     let can = Can::get();
-    let _devices = Devices::new(&can);
+    let _devices = Devices::new(&can.name, "mh4@5,dps@6");
     let first = poller(&can);
     let started = Instant::now();
     let done = cangauge(&format!("lss inquire 5 -q -b {}", can.name));
@@ -99,7 +79,7 @@ fn a_wait_ends_after_ten_seconds_or_with_ctrl_c() {
 #[ignore = "needs a CAN interface: tests/socketcan/run"]
 fn a_recording_of_tpdos_leaves_the_node_to_others() {
     let can = Can::get();
-    let _devices = Devices::new(&can);
+    let _devices = Devices::new(&can.name, "mh4@5,dps@6");
     let mut recording = command(&format!("log 5 --sync 50ms -b {}", can.name)).stdout(Stdio::piped()).spawn().unwrap();
     let mut rows = BufReader::new(recording.stdout.take().unwrap());
     for _ in 0..2 {
@@ -115,7 +95,7 @@ fn a_recording_of_tpdos_leaves_the_node_to_others() {
 #[ignore = "needs a CAN interface: tests/socketcan/run"]
 fn an_interface_is_one_claim_under_each_of_its_names() {
     let can = Can::get();
-    let _devices = Devices::new(&can);
+    let _devices = Devices::new(&can.name, "mh4@5,dps@6");
     run("ip", &["link", "property", "add", "dev", &can.name, "altname", "gauge-alt"]);
     let first = poller(&can);
     for bus in [can.name.as_str(), &format!("socketcan:{}", can.name), "gauge-alt"] {

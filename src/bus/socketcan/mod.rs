@@ -69,8 +69,9 @@ pub struct SocketCan {
     /// The identifiers to deliver, if they are too many for the kernel.
     wanted: Option<BTreeSet<CanId>>,
     timestamps: TimestampSource,
-    /// The bit rate, read once while the interface stays up, because this takes several system calls.
-    bit_rate: Cell<Option<Option<u32>>>,
+    /// The bit rate, and whether the interface only listens. Read once while it stays up, because this takes several
+    /// system calls.
+    controller: Cell<Option<(Option<u32>, bool)>>,
     /// The interface before its bit rate was set.
     original_link: Option<Link>,
 }
@@ -125,7 +126,7 @@ impl SocketCan {
             filters: filters.clone(),
             wanted,
             timestamps,
-            bit_rate: Cell::new(None),
+            controller: Cell::new(None),
             original_link: None,
         })
     }
@@ -145,7 +146,7 @@ impl SocketCan {
     fn set_is_up(&mut self, is_up: bool) {
         if self.is_up != is_up {
             self.is_up = is_up;
-            self.bit_rate.set(None);
+            self.controller.set(None);
             self.ready.push_back(Event::Link(is_up));
         }
     }
@@ -163,7 +164,7 @@ impl SocketCan {
         // If the bit rate is not supported, the interface may have gone down once more.
         let _ = self.socket.as_raw_socket().take_error();
         self.is_drained = false;
-        self.bit_rate.set(None);
+        self.controller.set(None);
         self.is_up = interfaces::is_up(&self.name).unwrap_or(result.is_ok());
         result
     }
@@ -229,6 +230,16 @@ impl SocketCan {
     /// Whether the interface was down and is up again.
     fn is_back(&self) -> bool {
         !self.is_up && !self.is_removed && interfaces::is_up(&self.name) == Some(true)
+    }
+
+    /// The bit rate, and whether the interface only listens.
+    fn controller(&self) -> (Option<u32>, bool) {
+        self.controller.get().unwrap_or_else(|| {
+            let of = |link: Link| (link.bit_rate(), link.listen_only == Some(true));
+            let found = netlink::get(&self.name).map_or((None, false), of);
+            self.controller.set(Some(found));
+            found
+        })
     }
 
     fn lose_interface(&mut self) {
@@ -313,10 +324,7 @@ impl SocketCan {
 
 impl BitRateControl for SocketCan {
     fn bit_rate(&self) -> Option<u32> {
-        if self.bit_rate.get().is_none() {
-            self.bit_rate.set(Some(netlink::get(&self.name).ok().and_then(|link| link.bit_rate())));
-        }
-        self.bit_rate.get().flatten()
+        self.controller().0
     }
 
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
@@ -377,6 +385,10 @@ impl Bus for SocketCan {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        // The driver would discard the frame without an error.
+        if self.controller().1 {
+            return Err(BusError::ListenOnly(self.name.clone()));
+        }
         self.has_sent = true;
         self.socket.write_frame(&to_kernel(frame)).map_err(|error| {
             // The kernel reports this once, to the first call.

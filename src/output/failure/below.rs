@@ -38,6 +38,9 @@ pub(super) fn bus(error: &BusError) -> Words {
         BusError::NoInterface(_) | BusError::NotCan(_) => {
             words.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
         }
+        BusError::ListenOnly(name) => {
+            words.hint(format!("leave this mode: sudo cangauge bus up {name} 250k (use the sensors' bit rate)"))
+        }
         BusError::ReceiveOnly(_) => words.hint(
             "commands that only listen work on it: log, check, pdo watch, scan --passive, nmt \
              watch",
