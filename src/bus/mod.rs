@@ -5,6 +5,7 @@
 
 pub mod channels;
 pub mod claim;
+pub mod coded;
 mod delegate;
 pub mod faults;
 pub mod file;

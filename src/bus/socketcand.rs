@@ -125,6 +125,22 @@ pub(super) fn frame_message(frame: &Frame, at: Stamp) -> String {
     format!("< frame {} {}.{:06} {data} >", frame.id(), at.as_secs(), at.subsec_micros())
 }
 
+/// The frame of a message of a server.
+pub(super) fn received_frame(message: &str) -> Option<Frame> {
+    let mut words = message.split_ascii_whitespace();
+    words.next().filter(|word| *word == "frame")?;
+    Some(frame(words)?.0)
+}
+
+/// The message of a client that sends a frame.
+pub(super) fn send_message(frame: &Frame) -> Result<String, BusError> {
+    if frame.is_remote() {
+        return Err(BusError::NoRemoteFrames);
+    }
+    let data: String = frame.data().iter().map(|byte| format!("{byte:X} ")).collect();
+    Ok(format!("< send {} {} {data}>", frame.id(), frame.len()))
+}
+
 /// The classes of an error frame (linux/can/error.h). The protocol has no details.
 fn faults(classes: u32) -> impl Iterator<Item = Fault> {
     const CLASSES: [(u32, Fault); 7] = [
@@ -246,13 +262,7 @@ impl Protocol for Client {
     }
 
     fn send(&mut self, frame: &Frame, _: Stamp, out: &mut Output) -> Result<(), BusError> {
-        if frame.is_remote() {
-            return Err(BusError::NoRemoteFrames);
-        }
-        let mut text = format!("< send {} {} ", frame.id(), frame.len());
-        frame.data().iter().for_each(|byte| text.push_str(&format!("{byte:X} ")));
-        out.bytes.extend(text.bytes());
-        out.bytes.push(b'>');
+        out.bytes.extend(send_message(frame)?.bytes());
         Ok(())
     }
 

@@ -53,7 +53,7 @@ pub(crate) fn judge(spec: &Spec, run: &mut Run) -> Vec<Violation> {
     frames(spec, run.sent_by_killed(), &mut violations);
     frames(spec, run.bus.all_sent().into_iter(), &mut violations);
     let after: Vec<DeviceState> =
-        run.bus.bus.inner().stations::<FaultyDevice>().map(|station| device_state(&station.device)).collect();
+        run.bus.bus.inner().inner().stations::<FaultyDevice>().map(|station| device_state(&station.device)).collect();
     others_unchanged(spec, run, &after, &mut violations);
     put_back(spec, run, &after, &mut violations);
     kinds(spec, run, &mut violations);

@@ -14,6 +14,7 @@
 mod bench;
 mod carry_out;
 mod command;
+mod healthy;
 mod judge;
 mod kinds;
 mod make;
@@ -55,7 +56,7 @@ fn run_and_judge(spec: &Spec) -> (Vec<Violation>, String) {
     let tried = catch_unwind(AssertUnwindSafe(|| {
         let mut run = run::run(spec);
         let end = format!("{:?} at {:?}\n", run.result, run.ended.since_start());
-        let devices = run.bus.bus.inner().stations::<station::FaultyDevice>();
+        let devices = run.bus.bus.inner().inner().stations::<station::FaultyDevice>();
         let devices: Vec<_> = devices.map(|station| bench::device_state(&station.device)).collect();
         let end = end + &format!("before {:?}\nafter {devices:?}", run.before);
         let violations = judge(spec, &mut run);

@@ -6,6 +6,7 @@ use crate::command::Command;
 use crate::kinds::LARGE_KIND;
 use crate::random::Random;
 use crate::spec::{Act, DeviceFault, DeviceSpec, Fault, Kill, Other, Spec};
+use cangauge::bus::coded::Codec;
 use commands::command;
 
 // Without baumer: it is recognised only with --device, so its signals have other names than in the record.
@@ -43,6 +44,8 @@ impl Spec {
             timeout_ms: timing.0,
             retries: timing.1,
             queue: *random.pick(&[10, 10, 10, 1, 2]),
+            codec: [None, None, Some(Codec::Slcan), Some(Codec::Socketcand)][(seed % 4) as usize]
+                .map(|codec| (codec, seed)),
             devices,
             others: Vec::new(),
             faults: Vec::new(),
@@ -62,6 +65,8 @@ impl Spec {
         }
         if random.percent(15) {
             spec.make_odd(random);
+            // The rules for odd devices need the exact times of the bus.
+            spec.codec = None;
         }
         spec
     }

@@ -6,6 +6,7 @@ use crate::spec::Spec;
 use crate::station::{FaultyDevice, ms};
 use crate::tap::{Passed, Tap};
 use crate::time::bound;
+use cangauge::bus::coded::Coded;
 use cangauge::bus::faults::Faulty;
 use cangauge::bus::memory::MemoryBus;
 use cangauge::bus::{Bus, Event, Filters, Mono};
@@ -19,7 +20,7 @@ use std::time::Duration;
 /// A finished command.
 pub(crate) struct Run {
     pub(crate) result: Result<Claim, Failure>,
-    pub(crate) bus: Tap<Faulty<MemoryBus>>,
+    pub(crate) bus: Tap<Coded<Faulty<MemoryBus>>>,
     /// The devices before the command.
     pub(crate) before: Vec<DeviceState>,
     pub(crate) started: Mono,
@@ -93,7 +94,8 @@ pub(crate) fn run(spec: &Spec) -> Run {
     let mut before = device_states(&bus);
     let bound = bound(spec);
     let kill = spec.kill.map(|kill| kill.before);
-    let mut bus = Tap::new(Faulty::new(bus, plan(&spec.faults)), started + bound, kill);
+    let bus = Coded::new(Faulty::new(bus, plan(&spec.faults)), spec.codec);
+    let mut bus = Tap::new(bus, started + bound, kill);
     let mut observed = Observations::default();
     let mut result = carry_out(&mut bus, spec, &mut observed);
     let mut killed = None;
@@ -101,7 +103,7 @@ pub(crate) fn run(spec: &Spec) -> Run {
         let frames = std::mem::take(&mut bus.frames);
         started = bus.now().mono + Duration::from_millis(kill.again_ms);
         wait(&mut bus.bus, started);
-        let after = device_states(bus.bus.inner());
+        let after = device_states(bus.bus.inner().inner());
         killed = Some(Killed { frames, before, after: after.clone() });
         before = after;
         bus = bus.restarted(started + bound);
@@ -115,7 +117,7 @@ pub(crate) fn run(spec: &Spec) -> Run {
         bus.overran = ended > bus.deadline || result.is_err();
     }
     // The last frames are sent, and devices that were reset have restarted.
-    wait(bus.bus.inner_mut(), ended + Duration::from_millis(400));
+    wait(bus.bus.inner_mut().inner_mut(), ended + Duration::from_millis(400));
     let settled = bus.now().mono;
     recorder.flush().expect("memory");
     let truth = record.0.lock().expect("no thread panicked").clone();

@@ -47,6 +47,9 @@ impl Spec {
                 });
             }
         }
+        if self.codec.is_some() {
+            without(&|spec| spec.codec = None);
+        }
         if self.kill.is_some() {
             without(&|spec| spec.kill = None);
         }

@@ -3,12 +3,15 @@
 
 use crate::command::Command;
 use crate::odd::Oddity;
+use cangauge::bus::coded::Codec;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Spec {
     pub(crate) timeout_ms: u64,
     pub(crate) retries: u32,
     pub(crate) queue: usize,
+    /// The text between the program and the bus.
+    pub(crate) codec: Option<(Codec, u64)>,
     pub(crate) devices: Vec<DeviceSpec>,
     pub(crate) others: Vec<Other>,
     pub(crate) faults: Vec<Fault>,
@@ -123,6 +126,7 @@ pub(crate) enum Act {
     },
     /// Switches all LSS slaves to waiting state.
     LssWait,
+    Sync,
 }
 
 /// A fault between the program and the bus. Frames are counted separately for each direction.

@@ -342,6 +342,7 @@ impl Station for SecondMaster {
                 }
                 Act::Write { node, index, sub, value, bytes } => write(node, index, sub, value, bytes),
                 Act::Nmt { specifier, node } => Frame::pair(CanId::NMT, specifier, node),
+                Act::Sync => Frame::empty(CanId::SYNC),
                 Act::LssWait => Frame::full(CanId::LSS_MASTER, [0x04, 0, 0, 0, 0, 0, 0, 0]),
             });
         }

@@ -14,10 +14,11 @@ use super::{BusError, Event, Fault, Mode, Mono, Received, Stamp, TimestampSource
 use crate::canopen::frame::Frame;
 use crate::canopen::wire_length::frame_time;
 use clock::MinuteClock;
-use firmware::{Firmware, ListenOnly};
+use firmware::{Firmware, ListenOnly, Rate};
 use std::collections::VecDeque;
 use std::time::Duration;
-use text::{Answer, Lines, command};
+use text::Answer;
+pub(super) use text::{Lines, command};
 
 /// The longest wait for the first answer. Some adapters restart when the port is opened.
 const WAKE_TIMEOUT: Duration = Duration::from_millis(2500);
@@ -47,7 +48,7 @@ enum Step {
     Serial,
     /// Checks whether the adapter supports the requested channel.
     Decide,
-    Rate(u8),
+    Rate(Rate),
     Stamps,
     Silent(bool),
     Open,
@@ -63,7 +64,7 @@ impl Step {
             Step::Detail => "v".to_owned(),
             Step::Serial => "N".to_owned(),
             Step::Decide => String::new(),
-            Step::Rate(digit) => format!("S{digit}"),
+            Step::Rate(rate) => rate.to_string(),
             Step::Stamps => "Z1".to_owned(),
             Step::Silent(on) => format!("M{}", u8::from(on)),
             Step::Open => "O".to_owned(),
@@ -153,13 +154,13 @@ impl Slcan {
     /// The commands that open the channel, or the reason why this is not possible.
     fn opening(&self) -> Result<Vec<Step>, String> {
         let Some((bit_rate, mode)) = self.channel else { return Ok(Vec::new()) };
-        let digit = self.firmware.rate_digit(bit_rate).ok_or_else(|| {
+        let rate = self.firmware.rate(bit_rate).ok_or_else(|| {
             let adapter = &self.firmware;
             format!(
                 "{adapter} is not known to have {bit_rate} bit/s (all have 10k, 20k, 50k, 100k, 125k, 250k, 500k, 1M)"
             )
         })?;
-        let mut steps = vec![Step::Rate(digit), Step::Stamps];
+        let mut steps = vec![Step::Rate(rate), Step::Stamps];
         let listen_only = self.firmware.listen_only();
         if listen_only == Some(ListenOnly::SilentMode) {
             steps.push(Step::Silent(mode == Mode::ListenOnly));

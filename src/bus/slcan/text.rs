@@ -8,7 +8,7 @@ const MAX_LINE: usize = 128;
 
 /// A message of an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Answer {
+pub(in crate::bus) enum Answer {
     /// `\r`, `z\r` or `Z\r`: the command was executed.
     Done,
     /// `\a`: the command was rejected.
@@ -21,16 +21,23 @@ pub(super) enum Answer {
     Garbage,
 }
 
+impl Answer {
+    /// The frame, if it is one.
+    pub(in crate::bus) fn frame(self) -> Option<Frame> {
+        if let Answer::Frame(frame, _) = self { Some(frame) } else { None }
+    }
+}
+
 /// Finds lines in a stream of bytes that arrive in pieces.
 #[derive(Debug, Default)]
-pub(super) struct Lines {
+pub(in crate::bus) struct Lines {
     line: Vec<u8>,
     /// Whether the present line is too long or has invalid bytes.
     is_garbage: bool,
 }
 
 impl Lines {
-    pub(super) fn feed(&mut self, bytes: &[u8], mut found: impl FnMut(Answer)) {
+    pub(in crate::bus) fn feed(&mut self, bytes: &[u8], mut found: impl FnMut(Answer)) {
         for &byte in bytes {
             match byte {
                 b'\r' => {
@@ -94,7 +101,7 @@ fn frame(line: &str) -> Option<(Frame, Option<u16>)> {
 }
 
 /// The command that sends a frame.
-pub(super) fn command(frame: &Frame) -> String {
+pub(in crate::bus) fn command(frame: &Frame) -> String {
     let is_extended = matches!(frame.id(), CanId::Extended(_));
     let kind = match (is_extended, frame.is_remote()) {
         (false, false) => 't',

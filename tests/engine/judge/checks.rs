@@ -85,7 +85,7 @@ fn answered_values(spec: &Spec, run: &mut Run, node: NodeId) -> Vec<f64> {
     let answers = rows::answers(run);
     let settled = run.settled;
     let mut values = Vec::new();
-    for station in run.bus.bus.inner_mut().stations_mut::<FaultyDevice>() {
+    for station in run.bus.bus.inner_mut().inner_mut().stations_mut::<FaultyDevice>() {
         if spec.devices[station.place].node != Some(node.get()) {
             continue;
         }

@@ -33,7 +33,7 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Claim, after: &[DeviceSt
             let sent = answers(run);
             for (node, object, raw) in values {
                 let expedited = sent.get(&(*node, *object)).is_some_and(|all| all.contains(raw));
-                let mut holders = run.bus.bus.inner_mut().stations_mut::<FaultyDevice>();
+                let mut holders = run.bus.bus.inner_mut().inner_mut().stations_mut::<FaultyDevice>();
                 let held = holders.any(|station| {
                     let value = station.device.value(*object, settled);
                     value.is_some_and(|value| value == *raw)
@@ -101,7 +101,7 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Claim, after: &[DeviceSt
         (Claim::Mapped(settings), Command::Map { node, .. })
             if !spec.is_changed_by_others() && !spec.falsifies_data() && !spec.shares_node_ids() =>
         {
-            for station in run.bus.bus.inner_mut().stations_mut::<FaultyDevice>() {
+            for station in run.bus.bus.inner_mut().inner_mut().stations_mut::<FaultyDevice>() {
                 if spec.devices[station.place].node == Some(*node)
                     && let Some(difference) = mapped_otherwise(station, settings, settled)
                 {
@@ -130,7 +130,7 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Claim, after: &[DeviceSt
             // The acknowledge of another master's write to the same object looks like ours.
             let acknowledged_by_others =
                 spec.acts().any(|act| matches!(act, Act::Write { index, .. } if *index == object.index));
-            let mut stations = run.bus.bus.inner_mut().stations_mut::<FaultyDevice>();
+            let mut stations = run.bus.bus.inner_mut().inner_mut().stations_mut::<FaultyDevice>();
             let held = stations.any(|station| {
                 let there = spec.devices[station.place].node == Some(*node);
                 let now = station.device.value(*object, settled);
@@ -218,7 +218,7 @@ pub(super) fn last_writes(spec: &Spec, run: &mut Run, violations: &mut Vec<Viola
         }
     }
     let settled = run.settled;
-    for station in run.bus.bus.inner_mut().stations_mut::<FaultyDevice>() {
+    for station in run.bus.bus.inner_mut().inner_mut().stations_mut::<FaultyDevice>() {
         let device = &spec.devices[station.place];
         for ((node, object), bytes) in &last {
             if device.node != Some(*node) || becomes_another(spec, *node, *object) {

@@ -9,7 +9,7 @@ use cangauge::output::failure::ErrorMessage;
 /// After a power cycle stored settings have their new values, and all others their old ones.
 pub(super) fn after_power(spec: &Spec, run: &mut Run, violations: &mut Vec<Violation>) {
     let settled = run.settled;
-    let bus = run.bus.bus.inner_mut();
+    let bus = run.bus.bus.inner_mut().inner_mut();
     bus.stations_mut::<FaultyDevice>().for_each(FaultyDevice::tame);
     bus.power_cycle();
     let after: Vec<DeviceState> = bus.stations::<FaultyDevice>().map(|station| device_state(&station.device)).collect();

@@ -13,7 +13,7 @@ pub(super) fn odd(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     }
     let odd = spec.devices.iter().find_map(|device| Some((device.node?, device.oddity?)));
     let Some((node, oddity)) = odd.filter(|_| !spec.shares_node_ids()) else { return };
-    let has_it = run.bus.bus.inner().stations::<FaultyDevice>().all(|station| station.has_oddity);
+    let has_it = run.bus.bus.inner().inner().stations::<FaultyDevice>().all(|station| station.has_oddity);
     if !has_it {
         return;
     }
@@ -59,7 +59,7 @@ fn twins(node: u8, run: &Run, violations: &mut Vec<Violation>) {
     let row = run.observed.rows.iter().find(has_value);
     violations.extend(row.map(|row| ("odd: no value of two devices", row.clone())));
     // Answers that collide arrive later, or never: a device may be bus-off meanwhile.
-    let sent = run.bus.bus.inner().stations::<FaultyDevice>().flat_map(|station| &station.sent);
+    let sent = run.bus.bus.inner().inner().stations::<FaultyDevice>().flat_map(|station| &station.sent);
     let answers: Vec<_> = sent
         .filter(|(at, frame)| *at <= run.ended && frame.id().sdo_response_node().is_some_and(|from| from.get() == node))
         .collect();

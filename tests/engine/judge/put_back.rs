@@ -77,7 +77,7 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violat
         && !matches!(run.result, Ok(Claim::Probed(false)))
         && clean_answers
     {
-        for station in run.bus.bus.inner_mut().stations_mut::<FaultyDevice>() {
+        for station in run.bus.bus.inner_mut().inner_mut().stations_mut::<FaultyDevice>() {
             let device = &spec.devices[station.place];
             if device.node != Some(node) {
                 continue;
@@ -95,7 +95,7 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violat
 
 /// Whether heartbeats of a device were received.
 fn heartbeats(run: &Run, before: &DeviceState) -> bool {
-    run.bus.bus.inner().stations::<FaultyDevice>().any(|station| {
+    run.bus.bus.inner().inner().stations::<FaultyDevice>().any(|station| {
         device_state(&station.device).node == before.node
             && station
                 .sent

@@ -114,7 +114,7 @@ fn without_overload(spec: &Spec, row: &str) -> String {
 /// The values that each node answered by expedited upload.
 pub(super) fn answers(run: &Run) -> BTreeMap<(u8, ObjectId), BTreeSet<Vec<u8>>> {
     let mut all: BTreeMap<_, BTreeSet<Vec<u8>>> = BTreeMap::new();
-    for station in run.bus.bus.inner().stations::<FaultyDevice>() {
+    for station in run.bus.bus.inner().inner().stations::<FaultyDevice>() {
         for (_, frame) in &station.sent {
             let (Some(node), Some(data)) = (frame.id().sdo_response_node(), frame.all_eight()) else { continue };
             if data[0] & 0x02 == 0 || data[0] >> 5 == 4 {
@@ -152,7 +152,7 @@ pub(super) fn signatures(spec: &Spec, run: &Run, violations: &mut Vec<Violation>
             | Command::Store { .. }
             | Command::Restore { .. }
     );
-    let mut devices = run.bus.bus.inner().stations::<FaultyDevice>();
+    let mut devices = run.bus.bus.inner().inner().stations::<FaultyDevice>();
     if acts && run.result.is_ok() && !spec.falsifies_data() && !devices.any(|station| !station.signed.is_empty()) {
         violations.push(("has the requested settings", "no signature reached the device".to_owned()));
     }

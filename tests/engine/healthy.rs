@@ -1,0 +1,72 @@
+//! Benches on which all is well: `doctor` finds nothing.
+
+use crate::bench::bench;
+use crate::env_number;
+use crate::kinds::LARGE_KIND;
+use crate::random::Random;
+use crate::spec::{Act, DeviceSpec, Other, Spec};
+use cangauge::bus::Bus;
+use cangauge::bus::coded::Coded;
+use cangauge::master::{Master, Timing};
+use cangauge::node::Overrides;
+use cangauge::sim::Recorder;
+use cangauge::tasks::doctor::{DoctorOptions, examine};
+use std::time::Duration;
+
+/// The number of benches of a plain `cargo test`; others: `ENGINE_HEALTHY=1000`.
+const BENCHES: u64 = 60;
+
+/// The devices of a scenario without its faults. They enter OPERATIONAL by themselves, and a master sends SYNC.
+fn healthy(seed: u64) -> Spec {
+    let mut spec = Spec::of(seed);
+    let random = &mut Random::new(seed);
+    for (at, device) in (0u8..).zip(&mut spec.devices) {
+        let node = device.node.unwrap_or(60) % 120 + 1 + at;
+        // These have no TPDO in their dictionary, which is a finding.
+        let has_tpdos = !matches!(device.kind, LARGE_KIND | "hydac-old");
+        *device = DeviceSpec {
+            kind: if has_tpdos { device.kind } else { "dps" },
+            node: Some(node),
+            start: true,
+            bit_rate: None,
+            unsaved_heartbeat: None,
+            overload: false,
+            device_faults: Vec::new(),
+            oddity: None,
+            ..device.clone()
+        };
+    }
+    let taken = |spec: &Spec| spec.shares_node_ids();
+    if taken(&spec) {
+        (0u8..).zip(&mut spec.devices).for_each(|(at, device)| device.node = Some(10 + 3 * at));
+    }
+    let every_ms = *random.pick(&[20, 100, 500]);
+    let plan = (0..10_000 / every_ms).map(|count| (count * every_ms * 1000, Act::Sync)).collect();
+    Spec { others: vec![Other::Master { plan }], faults: Vec::new(), interrupts: Vec::new(), kill: None, ..spec }
+}
+
+#[test]
+fn doctor_finds_nothing_where_all_is_well() {
+    let mut wrong = Vec::new();
+    for seed in 1..=env_number("ENGINE_HEALTHY").unwrap_or(BENCHES) {
+        let spec = healthy(seed);
+        let recorder = Recorder::new(Box::new(std::io::sink())).expect("no file");
+        let mut bus = Coded::new(bench(&spec, &recorder), spec.codec);
+        let until = bus.mono() + Duration::from_millis(20);
+        while matches!(bus.receive(until), Ok(cangauge::bus::Event::Frame(_))) {}
+        let timing = Timing { timeout: Duration::from_millis(500), retries: 1 };
+        let options = DoctorOptions {
+            node: spec.devices[0].node.filter(|_| seed % 3 == 0).map(crate::carry_out::node),
+            passive: false,
+            lss: seed % 5 == 0,
+            timeout: Duration::from_millis(200),
+            rounds: 2,
+            overrides: Overrides::new(),
+        };
+        let found = examine(&mut Master::new(&mut bus, timing), &options).expect("no Ctrl-C");
+        if !found.findings.is_empty() || found.nodes.is_empty() {
+            wrong.push(format!("seed {seed}: {found:?}\n{:?}", spec.devices));
+        }
+    }
+    assert!(wrong.is_empty(), "{} benches\n{}", wrong.len(), wrong[..wrong.len().min(5)].join("\n"));
+}
