@@ -344,6 +344,29 @@ fn devices_of_other_profiles() {
 }
 
 #[test]
+fn compact_pdos() {
+    let text = "[DeviceInfo]\nCompactPDO=0x13\nNrOfRXPDO=1\nNrOfTXPDO=5\n[OptionalObjects]\nSupportedObjects=2\n\
+                1=0x1801\n2=0x6000\n[1801]\nParameterName=Second\nObjectType=9\nSubNumber=1\n[1801sub1]\n\
+                ParameterName=Identifier\nDataType=7\nAccessType=ro\nDefaultValue=0x333\n[6000]\nParameterName=Value\n\
+                DataType=5\nAccessType=ro\nPDOMapping=1\n";
+    let eds = eds::read(text.as_bytes()).expect("an EDS");
+    assert_eq!(eds.warnings, []);
+    let subs = |index| {
+        eds.dictionary.iter().map(|entry| entry.object).filter(move |object| object.index == index).map(|it| it.sub)
+    };
+    assert_eq!(subs(0x1800).collect::<Vec<_>>(), [0, 1, 2, 5], "bits 0, 1 and 4");
+    assert_eq!(subs(0x1400).collect::<Vec<_>>(), [0, 1, 2, 5]);
+    assert_eq!(subs(0x1801).collect::<Vec<_>>(), [1], "as the file describes it");
+    assert_eq!((subs(0x1805).count(), subs(0x1A04).count(), subs(0x1A05).count()), (0, 9, 0));
+    let cob_ids = [0x1800, 0x1801, 0x1802, 0x1804, 0x1400].map(|index| number(&eds.dictionary, index, 1, 5));
+    assert_eq!(cob_ids, [0x185, 0x333, 0x385, 0x8000_0000, 0x205].map(Some));
+    assert_eq!(entry(&eds, "tpdo-3-communication-parameter:5").data_type, DataType::Unsigned(2));
+    assert_eq!(entry(&eds, "tpdo-5-mapping-parameter:8").data_type, DataType::Unsigned(4));
+    let none = eds::read(text.replace("0x13", "0").as_bytes()).expect("an EDS");
+    assert_eq!(none.dictionary.iter().count(), 2);
+}
+
+#[test]
 fn compact_arrays() {
     let eds = load("16-compact.eds", &[]);
     let count = |index| eds.dictionary.iter().filter(|entry| entry.object.index == index).count();
@@ -592,10 +615,7 @@ fn huge_numbers_need_no_extra_time_or_memory() {
 
 #[test]
 fn sixteen_channels_over_four_tpdos() {
-    let eds = load(
-        "30-sixteen-channels.eds",
-        &["line 34: CompactPDO: PDO objects without a description in the file are missing"],
-    );
+    let eds = load("30-sixteen-channels.eds", &[]);
     assert_eq!(mapping(&eds.dictionary, 4), [(0x7130, 13, 16), (0x7130, 14, 16), (0x7130, 15, 16), (0x7130, 16, 16)]);
     assert_eq!(
         [1, 2, 3, 4].map(|pdo| number(&eds.dictionary, 0x17ff + pdo, 1, 10)),

@@ -43,6 +43,12 @@ impl Content {
         }
     }
 
+    /// An unsigned setting of so many bytes.
+    pub(super) fn setting(bytes: u8, default: Option<Scalar>) -> Content {
+        let data_type = DataType::Unsigned(bytes);
+        Content { data_type, access: Access::Rw, default, ..Content::count(None) }
+    }
+
     /// An estimate of the memory of an entry, without its names.
     pub(super) fn bytes(&self) -> usize {
         let texts = [&self.default, &self.low, &self.high, &self.parameter_value];

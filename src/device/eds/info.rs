@@ -27,12 +27,6 @@ pub(super) fn info(ini: &Ini, warnings: &mut Vec<Warning>) -> Info {
         .filter(|rate| switch(section, &format!("BaudRate_{rate}"), warnings) == Some(true))
         .map(|rate| rate * 1000)
         .collect();
-    if let Some(item) = section.get("compactpdo")
-        && value::integer(&item.value).is_some_and(|mask| mask.value != 0)
-    {
-        let text = "CompactPDO: PDO objects without a description in the file are missing";
-        warnings.push(Warning::new(item.line, text));
-    }
     info
 }
 

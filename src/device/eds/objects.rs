@@ -40,6 +40,19 @@ const RECORD: i128 = 9;
 /// in three lines.
 const MOST_BYTES: usize = 32 << 20;
 
+/// The most PDOs in each direction (CiA 301).
+const PDOS: i128 = 512;
+
+/// The communication parameters of a PDO: name, bytes. Bit 0 of `CompactPDO` is sub-index 1.
+const PDO_PARAMETERS: [(&str, u8); 6] = [
+    ("COB-ID", 4),
+    ("Transmission type", 1),
+    ("Inhibit time", 2),
+    ("Compatibility entry", 1),
+    ("Event timer", 2),
+    ("SYNC start value", 1),
+];
+
 /// Reads every object.
 pub(super) fn read(ini: &Ini, warnings: &mut Vec<Warning>) -> Objects {
     let parts = sections::objects(ini, warnings);
@@ -47,6 +60,7 @@ pub(super) fn read(ini: &Ini, warnings: &mut Vec<Warning>) -> Objects {
     for (index, parts) in &parts {
         reader.object(*index, parts);
     }
+    reader.compact_pdos(&parts);
     reader.objects
 }
 
@@ -130,6 +144,41 @@ impl Reader<'_> {
             // CiA 306: an element without its own name has the name of the array with its number appended.
             let name = names.get(&sub).map_or_else(|| format!("{title}{sub}"), |item| item.value.clone());
             self.push(ObjectId::new(index, sub), Kind::Array, main, &name, &content);
+        }
+    }
+
+    /// The PDO parameters without a section of their own, if the file describes its PDOs by `CompactPDO` (CiA 306).
+    fn compact_pdos(&mut self, parts: &BTreeMap<u16, Parts>) {
+        let Some(section) = self.ini.section("deviceinfo") else { return };
+        let Some(mask) = number(section, "compactpdo").filter(|mask| *mask > 0) else { return };
+        let directions = [("NrOfRXPDO", "RPDO", 0x1400, 0x200), ("NrOfTXPDO", "TPDO", 0x1800, 0x180)];
+        for (key, title, first, cob_id) in directions {
+            let count = number(section, &key.to_ascii_lowercase()).unwrap_or_default().clamp(0, PDOS);
+            for pdo in 0..u16::try_from(count).unwrap_or_default() {
+                let described = |index| parts.contains_key(&index);
+                let object = ObjectId::new(first + pdo, 0);
+                if !described(object.index) {
+                    self.objects.names.insert(object.index, format!("{title} {} communication parameter", pdo + 1));
+                    let default = Scalar::NodeIdPlus(cob_id + 0x100 * u32::from(pdo));
+                    // Only four PDOs have an identifier of their own; the others are off.
+                    let default = if pdo < 4 { default } else { Scalar::Integer(1 << 31) };
+                    let is_in_mask = |sub: u8| sub <= 2 || mask >> (sub - 1) & 1 == 1;
+                    let last = (1..=6).rev().find(|sub| is_in_mask(*sub));
+                    self.push(object, Kind::Record, section, "", &Content::count(last));
+                    for (sub, (name, bytes)) in (1..).zip(PDO_PARAMETERS).filter(|(sub, _)| is_in_mask(*sub)) {
+                        let content = Content::setting(bytes, Some(default.clone()).filter(|_| sub == 1));
+                        self.push(object.with_sub(sub), Kind::Record, section, name, &content);
+                    }
+                }
+                let object = ObjectId::new(object.index + 0x200, 0);
+                if !described(object.index) {
+                    self.objects.names.insert(object.index, format!("{title} {} mapping parameter", pdo + 1));
+                    self.push(object, Kind::Array, section, "", &Content::setting(1, None));
+                    for sub in 1..=8 {
+                        self.push(object.with_sub(sub), Kind::Array, section, "", &Content::setting(4, None));
+                    }
+                }
+            }
         }
     }
 
