@@ -18,6 +18,8 @@ pub struct AssignEntry {
     pub node_id: Option<AssignObject>,
     /// The object for the index of the bit rate.
     pub bit_rate: Option<AssignObject>,
+    /// Its own indices of the bit rates in bit/s; empty if it uses those of the device.
+    pub bit_rates: BTreeMap<u8, u32>,
     /// The object that stores both, written with "save"; `None` if the device stores them by itself. LSS has its own
     /// store service.
     pub store: Option<ObjectId>,
@@ -40,6 +42,7 @@ impl AssignEntry {
             retry_stopped: false,
             node_id: None,
             bit_rate: None,
+            bit_rates: BTreeMap::new(),
             store: None,
             applies: Applies::default(),
             unverified: false,
@@ -125,12 +128,12 @@ const STANDARD: [(u8, u32); 8] =
     [(0, 1_000_000), (1, 800_000), (2, 500_000), (3, 250_000), (4, 125_000), (6, 50_000), (7, 20_000), (8, 10_000)];
 
 impl RateTable {
-    /// The table of a device, or the table of CiA 305 if that of the device is unknown.
-    pub fn of(description: Option<&Description>) -> RateTable {
-        let own = description.filter(|description| !description.bit_rates.is_empty());
+    /// The table of a device for a method, or the table of CiA 305 if that of the device is unknown.
+    pub fn of(description: Option<&Description>, method: AssignKind) -> RateTable {
+        let own = description.map(|description| description.bit_rates_of(method)).filter(|rates| !rates.is_empty());
         let auto = description.and_then(|description| description.auto_bit_rate);
         match own {
-            Some(description) => RateTable { rates: description.bit_rates.clone(), auto, source: RateSource::Device },
+            Some(rates) => RateTable { rates: rates.clone(), auto, source: RateSource::Device },
             None => RateTable { rates: STANDARD.into_iter().collect(), auto, source: RateSource::Standard },
         }
     }
@@ -173,6 +176,12 @@ impl Description {
         self.assign.iter().find(|entry| !entry.unverified)
     }
 
+    /// The bit rates in bit/s by their indices for a method; empty if they are unknown.
+    pub fn bit_rates_of(&self, method: AssignKind) -> &BTreeMap<u8, u32> {
+        let own = self.assign_of_kind(method).map(|entry| &entry.bit_rates).filter(|rates| !rates.is_empty());
+        own.unwrap_or(&self.bit_rates)
+    }
+
     /// The method of this kind, if the device has it.
     pub fn assign_of_kind(&self, kind: AssignKind) -> Option<&AssignEntry> {
         self.assign.iter().find(|entry| entry.kind == kind)
@@ -190,17 +199,22 @@ mod tests {
 
     #[test]
     fn each_device_has_its_own_table() {
-        let dps = RateTable::of(Some(&description("dps")));
+        let dps = RateTable::of(Some(&description("dps")), AssignKind::Lss);
         assert_eq!((dps.index_of(100_000), dps.index_of(125_000), dps.index_of(800_000)), (Some(5), Some(4), None));
         assert_eq!((dps.auto(), dps.source), (None, RateSource::Device));
         assert_eq!(dps.rates(), [1_000_000, 500_000, 250_000, 125_000, 100_000, 50_000]);
-        let mh4 = RateTable::of(Some(&description("mh4")));
+        let mh4 = RateTable::of(Some(&description("mh4")), AssignKind::Objects);
         assert_eq!((mh4.auto(), mh4.index_of(100_000), mh4.rate_of(5)), (Some(9), None, None));
         // CiA 305: index 5 is reserved, and automatic detection (9) is not assumed.
-        let standard = RateTable::of(None);
+        let standard = RateTable::of(None, AssignKind::Lss);
         assert_eq!((standard.rate_of(5), standard.rate_of(9), standard.auto()), (None, None, None));
         assert_eq!((standard.index_of(10_000), standard.source), (Some(8), RateSource::Standard));
-        assert_eq!(RateTable::of(Some(&description("d20"))).source, RateSource::Standard);
+        assert_eq!(RateTable::of(Some(&description("d20")), AssignKind::Lss).source, RateSource::Standard);
+        // 2100h has other codes than LSS.
+        let [lss, objects] =
+            [AssignKind::Lss, AssignKind::Objects].map(|method| RateTable::of(Some(&description("baumer")), method));
+        assert_eq!((lss.index_of(250_000), lss.index_of(800_000)), (Some(3), Some(1)));
+        assert_eq!((objects.index_of(250_000), objects.index_of(800_000)), (Some(4), Some(6)));
     }
 
     #[test]

@@ -37,8 +37,10 @@ pub(super) struct Settings {
     pub(super) persistent: Pair,
     /// The bit rate of the bus, if it is known.
     pub(super) bus_bit_rate: Option<u32>,
-    /// The codes of the bit rates.
-    codes: Vec<(u8, BitRate)>,
+    /// The codes of the bit rates for LSS.
+    lss_codes: Vec<(u8, BitRate)>,
+    /// The codes of the bit rates in the object.
+    object_codes: Vec<(u8, BitRate)>,
     node_at: Option<Place>,
     rate_at: Option<Place>,
 }
@@ -55,12 +57,13 @@ struct Place {
 
 impl Settings {
     pub(super) fn new(description: &Description, objects: &Objects, pair: Pair) -> Settings {
-        let mut codes: Vec<(u8, BitRate)> =
-            description.bit_rates.iter().map(|(code, rate)| (*code, BitRate::At(*rate))).collect();
-        if codes.is_empty() {
-            codes = STANDARD.map(|(code, rate)| (code, BitRate::At(rate))).to_vec();
-        }
-        codes.extend(description.auto_bit_rate.map(|code| (code, BitRate::Auto)));
+        let codes = |method| {
+            let own = description.bit_rates_of(method).iter().map(|(&code, &rate)| (code, rate));
+            let own: Vec<(u8, u32)> = own.collect();
+            let known = if own.is_empty() { STANDARD.to_vec() } else { own };
+            let rates = known.into_iter().map(|(code, rate)| (code, BitRate::At(rate)));
+            rates.chain(description.auto_bit_rate.map(|code| (code, BitRate::Auto))).collect()
+        };
         let entry = description.assign.iter().find(|entry| entry.kind == AssignKind::Objects);
         let place = |place: fn(&AssignEntry) -> Option<AssignObject>| {
             let entry = entry?;
@@ -73,7 +76,8 @@ impl Settings {
             pending: pair,
             persistent: pair,
             bus_bit_rate: None,
-            codes,
+            lss_codes: codes(AssignKind::Lss),
+            object_codes: codes(AssignKind::Objects),
             node_at: place(|entry| entry.node_id),
             rate_at: place(|entry| entry.bit_rate),
         }
@@ -112,17 +116,14 @@ impl Settings {
 
     /// Sets the pending bit rate; `false` if the device has no such code.
     pub(super) fn configure_rate(&mut self, code: u8) -> bool {
-        match self.rate(code) {
-            Some(rate) => {
-                self.pending.rate = rate;
-                true
-            }
-            None => false,
-        }
+        let rate = self.lss_codes.iter().find(|(known, _)| *known == code).map(|(_, rate)| *rate);
+        self.pending.rate = rate.unwrap_or(self.pending.rate);
+        rate.is_some()
     }
 
+    /// The bit rate of a code in the object.
     fn rate(&self, code: u8) -> Option<BitRate> {
-        self.codes.iter().find(|(known, _)| *known == code).map(|(_, rate)| *rate)
+        self.object_codes.iter().find(|(known, _)| *known == code).map(|(_, rate)| *rate)
     }
 
     /// Whether a write of node-ID or bit rate is allowed.
@@ -173,6 +174,6 @@ impl Settings {
             BitRate::At(rate) => rate,
             BitRate::Auto => self.bus_bit_rate?,
         };
-        self.codes.iter().find(|(_, known)| *known == BitRate::At(rate)).map(|(code, _)| *code)
+        self.object_codes.iter().find(|(_, known)| *known == BitRate::At(rate)).map(|(code, _)| *code)
     }
 }

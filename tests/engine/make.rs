@@ -9,7 +9,7 @@ use crate::spec::{Act, DeviceFault, DeviceSpec, Fault, Kill, Other, Spec};
 use cangauge::bus::coded::Codec;
 use commands::command;
 
-// Without baumer: it is recognised only with --device, so its signals have other names than in the record.
+// Without baumer: its signal has no model.
 const KINDS: [&str; 14] = [
     "mh4",
     "mh4",

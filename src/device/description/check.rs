@@ -296,15 +296,23 @@ fn identify(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_
 }
 
 fn bit_rates(description: &Description, tables: &Tables<'_, '_>) {
-    let Some(table) = tables.bit_rates else { return };
-    let mut rates = BTreeSet::new();
-    for (index, rate) in &description.bit_rates {
-        let key = index.to_string();
-        if !(1..=1_000_000).contains(rate) {
-            table.mistake(&key, format!("bit_rates: {rate} bit/s is not in the range 1 to 1000000"));
-        } else if !rates.insert(rate) {
-            table.mistake(&key, format!("bit_rates: two indices have {rate} bit/s"));
+    let check = |rates: &BTreeMap<u8, u32>, table: &Table<'_>, key: Option<&str>| {
+        let mut seen = BTreeSet::new();
+        for (index, rate) in rates {
+            let index = index.to_string();
+            let key = key.unwrap_or(&index);
+            if !(1..=1_000_000).contains(rate) {
+                table.mistake(key, format!("bit_rates: {rate} bit/s is not in the range 1 to 1000000"));
+            } else if !seen.insert(rate) {
+                table.mistake(key, format!("bit_rates: two indices have {rate} bit/s"));
+            }
         }
+    };
+    if let Some(table) = tables.bit_rates {
+        check(&description.bit_rates, table, None);
+    }
+    for (entry, table) in description.assign.iter().zip(&tables.assign) {
+        check(&entry.bit_rates, table, Some("bit_rates"));
     }
 }
 

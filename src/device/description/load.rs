@@ -145,12 +145,26 @@ fn assign_entry(table: &mut Table<'_>) -> Option<AssignEntry> {
     let (state, retry_stopped) = (table.optional("state"), table.or_default("retry_stopped"));
     let node_id = table.table("node_id").map(|mut place| assign_place(&mut place));
     let bit_rate = table.table("bit_rate").map(|mut place| assign_place(&mut place));
+    let bit_rates = table.table("bit_rates").map(|rates| rates.entries("bit_rates")).unwrap_or_default();
     let (store, applies) = (table.optional("store"), table.or_default("applies"));
     let unverified = table.or_default("unverified");
     let (page, doubt) = (table.or_default("page"), table.or_default("doubt"));
     table.finish();
     let (node_id, bit_rate) = (node_id.flatten(), bit_rate.flatten());
-    Some(AssignEntry { kind: kind?, state, retry_stopped, node_id, bit_rate, store, applies, unverified, page, doubt })
+    let kind = kind?;
+    Some(AssignEntry {
+        kind,
+        state,
+        retry_stopped,
+        node_id,
+        bit_rate,
+        bit_rates,
+        store,
+        applies,
+        unverified,
+        page,
+        doubt,
+    })
 }
 
 fn assign_place(table: &mut Table<'_>) -> Option<AssignObject> {

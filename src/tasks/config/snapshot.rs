@@ -6,6 +6,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, TpdoNumber};
 use crate::canopen::sdo::AbortCode;
 use crate::canopen::value::DataType;
+use crate::device::assign::AssignKind;
 use crate::device::config_file::Item;
 use crate::master::{Master, SdoError, SdoFailure};
 use crate::node::Node;
@@ -211,7 +212,7 @@ fn read_objects(master: &mut Master<'_>, node: &Node, objects: &[(ObjectId, Data
 fn bit_rate(node: &Node, values: &BTreeMap<ObjectId, Vec<u8>>) -> Option<u32> {
     let model = node.model.as_ref()?;
     let code = *values.get(&model.dictionary.find("bit-rate")?.object)?.first()?;
-    model.description.bit_rates.get(&code).copied()
+    model.description.bit_rates_of(AssignKind::Objects).get(&code).copied()
 }
 
 /// Updates units and digits.

@@ -105,8 +105,8 @@ fn prepare(
     let method = choose_method(&device, job.via, job.store, notify)?;
     let plan = |rate| plan_rate(device.description(), rate, method.kind).map_err(|cause| device.failure(cause));
     let rate = job.rate.map(plan).transpose()?;
-    if let (Some(RequestedRate::Bits(_)), RateSource::Standard) = (job.rate, RateTable::of(device.description()).source)
-    {
+    let table = RateTable::of(device.description(), method.kind);
+    if let (Some(RequestedRate::Bits(_)), RateSource::Standard) = (job.rate, table.source) {
         notify(device.note(LssEvent::StandardRateTable));
     }
     let changes_to = job.id.filter(|new| device.node != Some(*new));
@@ -203,7 +203,8 @@ impl Work<'_> {
         notify: Notify<'_>,
     ) -> Result<bool, Failure> {
         let (job, device, progress) = (self.job, self.device, &mut self.progress);
-        let old_rate = master.bus().bit_rate().and_then(|rate| RateTable::of(device.description()).index_of(rate));
+        let table = RateTable::of(device.description(), AssignKind::Lss);
+        let old_rate = master.bus().bit_rate().and_then(|rate| table.index_of(rate));
         let session: Session<()> = prepared(master, device, &self.method, notify, |lss| {
             let result = configure(lss, job, !has_rate, progress).map_err(|error| device.lss_failure(error));
             if result.is_err() && progress.is_pending() {

@@ -105,7 +105,7 @@ pub(super) fn plan_rate(
     rate: RequestedRate,
     method: AssignKind,
 ) -> Result<PlannedRate, LssCause> {
-    let table = RateTable::of(description);
+    let table = RateTable::of(description, method);
     let title = description.map(|description| description.title.clone());
     let is_standard = table.source == RateSource::Standard;
     if method == AssignKind::Objects && is_standard && !matches!(rate, RequestedRate::Index(..)) {

@@ -173,7 +173,7 @@ impl<'a> Retiming<'a> {
         let device_answers = matches!(answers(master, device, device.node), Ok(true));
         if device_answers {
             // Otherwise the next reset would activate the new bit rate.
-            let index = RateTable::of(device.description()).index_of(self.old);
+            let index = RateTable::of(device.description(), self.method.kind).index_of(self.old);
             let is_reverted = index.is_some_and(|index| {
                 let revert = configured(master, device, |lss| {
                     lss.configure_bit_timing(0, index).map_err(|error| device.lss_failure(error))

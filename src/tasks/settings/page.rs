@@ -4,6 +4,7 @@ use super::info::{Date, Meaning, Store};
 use super::{ValueWithUnit, filter, quantity};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
+use crate::device::assign::AssignKind;
 use crate::device::description::{Access, Signature};
 use crate::device::sensor;
 use crate::device::unit::Unit;
@@ -98,7 +99,7 @@ pub(super) fn range(
 pub(super) fn bit_rate(node: &Node, values: &BTreeMap<ObjectId, Value>) -> Option<u32> {
     let model = node.model.as_ref()?;
     let code = values.get(&model.dictionary.find("bit-rate")?.object)?.as_u64()?;
-    model.description.bit_rates.get(&u8::try_from(code).ok()?).copied()
+    model.description.bit_rates_of(AssignKind::Objects).get(&u8::try_from(code).ok()?).copied()
 }
 
 /// The groups of 1010h, and the settings that it stores.
