@@ -26,7 +26,7 @@ const NO_SUB_INDEX: u32 = 0x0609_0011;
 const GENERAL: u32 = 0x0800_0000;
 
 /// Objects outside of CiA 404 whose values move.
-const MEASURED: [&str; 4] = ["minimum-pv", "maximum-pv", "process-value-integer", "pressure-float"];
+const MEASURED: [&str; 4] = ["minimum-pv", "maximum-pv", "process-value-integer", "rest-lifetime"];
 
 /// Incomplete descriptions: they cover one procedure only and say so.
 const INCOMPLETE: [&str; 6] = ["hydac-old", "baumer", "danfoss-p92c", "epson-a552", "epson-g552", "hydronautics"];
@@ -46,7 +46,8 @@ struct Desk<'a> {
 }
 
 fn with_desk(model: &Arc<Model>, work: impl FnOnce(&mut Desk<'_>)) {
-    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(250_000);
+    let bit_rate = model.description.factory.bit_rate.unwrap_or(250_000);
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(bit_rate);
     bus.attach(Device::new(Setup::new(Arc::clone(model), node())).expect("a device"));
     let timing = Timing { timeout: Duration::from_millis(500), retries: 0 };
     work(&mut Desk { model, master: Master::new(&mut bus, timing) });

@@ -195,11 +195,13 @@ impl Device {
         out.send(Frame::byte(CanId::heartbeat(self.memory.node), 0x00));
         self.toggle = false;
         self.restart_heartbeat(now + self.heartbeat_period().unwrap_or_default());
-        // MH-4, 4.1.16: 8 means autonomous start. CiA 302-2: bit 3 set and bit 2 clear.
-        let startup = self.memory.objects.number(NMT_STARTUP);
-        let other = self.setup.model.description.startup.as_ref().filter(|startup| startup.object != NMT_STARTUP);
-        let by_other = other.is_some_and(|other| self.memory.objects.number(other.object) == other.auto);
-        let starts = self.setup.start || by_other || startup & 0b1100 == 0b1000;
+        let number = |object| self.memory.objects.number(object);
+        let autonomous = match &self.setup.model.description.startup {
+            Some(startup) => number(startup.object) == startup.auto,
+            // CiA 302-2: bit 3 set and bit 2 clear.
+            None => number(NMT_STARTUP) & 0b1100 == 0b1000,
+        };
+        let starts = self.setup.start || autonomous;
         self.enter(if starts { State::Operational } else { State::PreOperational }, now);
         self.memory.channels.begin(&mut self.memory.objects, now.since_start());
         self.memory.emergencies.publish(&mut self.memory.objects);

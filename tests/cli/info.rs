@@ -163,12 +163,14 @@ fn hydac_and_jumo_are_described_by_toml_files() {
     assert_eq!((&found[0]["device"], &found[1]["device"]), (&json!("hydac"), &json!("jumo")));
     let rows = bench.run("read all -f json").exit(0).json();
     let signals: Vec<&str> = rows.iter().filter_map(|row| row["signal"].as_str()).collect();
-    assert_eq!(signals, ["pressure", "ch1", "ch2"]);
-    assert!(rows.iter().all(|row| row["status"] == "ok"));
+    assert_eq!(signals, ["pressure", "rest-lifetime", "operating-hours", "temperature", "ch1", "ch2"]);
+    assert!(rows.iter().all(|row| row["status"] == "ok" || row["signal"] == "operating-hours"));
     let rows = bench.run("log 1,126 --duration 3s -f json").exit(0).json();
     let of = |node: u8, signal: &str| rows.iter().filter(|row| row["node"] == node && row["signal"] == signal).count();
-    // HYDAC sends 3601h each second; JUMO has TPDO5 off by default.
-    assert!((2..=3).contains(&of(1, "pressure")), "{}", of(1, "pressure"));
+    // HYDAC sends both TPDOs each second; JUMO has TPDO5 off by default.
+    for signal in ["rest-lifetime", "operating-hours", "pressure"] {
+        assert!((2..=3).contains(&of(1, signal)), "{signal} {}", of(1, signal));
+    }
     assert!(of(126, "ch1") >= 28, "{}", of(126, "ch1"));
     assert_eq!(of(126, "ch2"), 0);
 }
@@ -179,7 +181,7 @@ fn hydac_boots_operational_and_stores_its_node_id_with_1010h_4() {
     let done = bench.run("log 1 --passive --device hydac --duration 3s -f json").exit(0);
     assert!(done.stdout.lines().count() >= 2, "it sends without an NMT start: {}", done.stderr);
     bench.run("nmt startup 1").prints("auto\n");
-    let kept = Bench::described("[[device]]\nkind = \"hydac\"\nnode = 1\nset = { \"0x1F80\" = 12 }\n");
+    let kept = Bench::described("[[device]]\nkind = \"hydac\"\nnode = 1\nset = { \"0x1F80\" = 8 }\n");
     kept.run("nmt startup 1").prints("wait\n");
     bench.run("sdo write 1 0x2003:2 9 --type u8").exit(0);
     bench.run("unit 1 psi").exit(0);
