@@ -1237,7 +1237,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__completions)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version bash elvish fish powershell zsh"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version bash elvish fish powershell zsh install bash elvish fish powershell zsh"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0

@@ -1,7 +1,8 @@
 //! `cangauge completions`.
 
 use super::args::Override;
-use super::exit::{open_stdout, stdout};
+use super::exit::{FileError, open_stdout, stdout};
+use super::file::ReportFile;
 use super::{Cli, Global, descriptions, program};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -9,25 +10,59 @@ use crate::device::catalog::{self, Model};
 use crate::device::dictionary::Entry;
 use crate::device::standard;
 use crate::node::offline::offline;
-use clap::{Args, Command, CommandFactory};
+use crate::output::failure::ErrorMessage;
+use clap::builder::PossibleValue;
+use clap::{Args, Command, CommandFactory, ValueEnum};
 use clap_complete::Shell;
 use std::collections::BTreeSet;
+use std::env;
+use std::fs;
 use std::io::Write;
+use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Print the completion script for a shell
+/// Print or install the completion script for a shell
 ///
-/// The script completes commands, options, device names, units, and the names of signals and objects: those in --device
+/// "install" writes the script to the user's folder of bash, zsh or fish, and prints its path. The script completes commands, options, device names, units, and the names of signals and objects: those in --device
 /// and --eds, else those of the built-in descriptions. It uses no bus.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  cangauge completions bash > ~/.local/share/bash-completion/completions/cangauge")]
+#[command(after_help = "Examples:\n  cangauge completions install\n  cangauge completions bash > cangauge.bash")]
 pub(crate) struct Completions {
-    /// Shell: bash, zsh, fish, elvish or powershell
-    #[arg(required_unless_present = "line")]
+    /// Shell: bash, zsh, fish, elvish or powershell; or install
+    #[arg(required_unless_present = "line", value_name = "SHELL|install", hide_possible_values = true)]
+    action: Option<Action>,
+    /// Shell for install: bash, zsh or fish [default: the shell in $SHELL]
+    #[arg(value_name = "SHELL", hide_possible_values = true)]
     shell: Option<Shell>,
     /// For the scripts: print the names that fit after these words of a command line; the last word is incomplete
     #[arg(last = true, hide = true, allow_hyphen_values = true)]
     line: Vec<String>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Action {
+    Print(Shell),
+    Install,
+}
+
+impl ValueEnum for Action {
+    fn value_variants<'a>() -> &'a [Action] {
+        &[
+            Action::Print(Shell::Bash),
+            Action::Print(Shell::Elvish),
+            Action::Print(Shell::Fish),
+            Action::Print(Shell::PowerShell),
+            Action::Print(Shell::Zsh),
+            Action::Install,
+        ]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Action::Print(shell) => shell.to_possible_value(),
+            Action::Install => Some(PossibleValue::new("install")),
+        }
+    }
 }
 
 impl Completions {
@@ -38,12 +73,41 @@ impl Completions {
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         // Generated in memory first, because the generator panics on a closed pipe.
-        let text = match self.shell {
-            Some(shell) => script(shell),
-            None => names(&self.line, global).into_iter().flat_map(|name| format!("{name}\n").into_bytes()).collect(),
+        let text = match (self.action, self.shell) {
+            (Some(Action::Install), shell) => install(shell, global)?,
+            (Some(Action::Print(_)), Some(shell)) => {
+                return Err(ErrorMessage::usage(format!("{shell} follows only \"install\"")).into());
+            }
+            (Some(Action::Print(shell)), None) => script(shell),
+            (None, _) => {
+                names(&self.line, global).into_iter().flat_map(|name| format!("{name}\n").into_bytes()).collect()
+            }
         };
         open_stdout()?.write_all(&text).map_err(stdout)
     }
+}
+
+/// Writes the script to the folder from which the shell loads completions. Returns its path as a line.
+fn install(shell: Option<Shell>, global: &Global) -> anyhow::Result<Vec<u8>> {
+    let usage = |message: &str| ErrorMessage::usage(message).hint("name the shell: cangauge completions install bash");
+    let shell = shell.or_else(Shell::from_env).ok_or_else(|| usage("the shell in $SHELL is unknown"))?;
+    let variable = |name: &str| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let home = variable("HOME").ok_or_else(|| ErrorMessage::usage("the home folder is unknown: $HOME is not set"))?;
+    let folder = |name: &str, default: &str| variable(name).unwrap_or_else(|| home.join(default));
+    let path = match shell {
+        Shell::Bash => folder("XDG_DATA_HOME", ".local/share").join("bash-completion/completions/cangauge"),
+        Shell::Fish => folder("XDG_CONFIG_HOME", ".config").join("fish/completions/cangauge.fish"),
+        Shell::Zsh => folder("ZDOTDIR", "").join(".zfunc/_cangauge"),
+        other => return Err(usage(&format!("{other} has no folder for completions")).into()),
+    };
+    let parent = path.parent().unwrap_or(&home);
+    fs::create_dir_all(parent).map_err(|source| FileError { what: format!("create {}", parent.display()), source })?;
+    ReportFile::create(&path, false, None)?.write(&script(shell))?;
+    if shell == Shell::Zsh {
+        let line = format!("fpath=({} $fpath)", parent.display());
+        global.console().note(&format!("zsh loads it if .zshrc has this line before compinit: {line}"));
+    }
+    Ok(format!("{}\n", path.display()).into_bytes())
 }
 
 /// The names after the generated functions: a function that asks the program for names.

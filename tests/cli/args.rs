@@ -163,6 +163,37 @@ fn printed_completions_equal_the_shipped_files() {
     assert_eq!(Bench::of(ALL).run("completions tcsh").exit(2).stdout, "");
 }
 
+#[test]
+fn completions_are_installed_in_the_folder_of_the_shell() {
+    let bench = Bench::of(ALL);
+    let home = bench.path("home").display().to_string();
+    let install = |words: &[&str], variables: &[(&str, &str)]| {
+        let words = [&["completions", "install"], words].concat();
+        let mut command = bench.command(&words);
+        command.env("HOME", &home).envs(variables.iter().copied()).output().expect("it runs")
+    };
+    let other = format!("{home}/other");
+    for (words, variables, file, shell) in [
+        (&[][..], &[("SHELL", "/bin/bash")][..], "/.local/share/bash-completion/completions/cangauge", "bash"),
+        (&["fish"], &[("SHELL", "/bin/bash")], "/.config/fish/completions/cangauge.fish", "fish"),
+        (&["fish"], &[("XDG_CONFIG_HOME", &other)], "/other/fish/completions/cangauge.fish", "fish"),
+        (&[], &[("SHELL", "/usr/bin/zsh")], "/.zfunc/_cangauge", "zsh"),
+        // An installed script is replaced.
+        (&["zsh"], &[], "/.zfunc/_cangauge", "zsh"),
+    ] {
+        let done = install(words, variables);
+        assert_eq!(String::from_utf8_lossy(&done.stdout), format!("{home}{file}\n"), "{done:?}");
+        let script = std::fs::read_to_string(format!("{home}{file}")).expect("the script");
+        assert_eq!(script, bench.run_words(&["completions", shell]).exit(0).stdout);
+        assert_eq!(String::from_utf8_lossy(&done.stderr).contains("fpath=("), shell == "zsh", "{done:?}");
+    }
+    for (words, variables) in [(&[][..], &[("SHELL", "/bin/tcsh")][..]), (&["elvish"], &[]), (&[], &[("SHELL", "")])] {
+        assert_eq!(install(words, variables).status.code(), Some(2), "{words:?}");
+    }
+    assert_eq!(install(&["bash"], &[("HOME", "")]).status.code(), Some(2));
+    bench.run("completions bash zsh").exit(2);
+}
+
 /// An interface that does not exist. The message depends on the kernel, the exit code does not.
 #[test]
 #[cfg(target_os = "linux")]
