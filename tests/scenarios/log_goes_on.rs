@@ -17,7 +17,6 @@ use cangauge::master::{Master, Request, Timing};
 use cangauge::sim::Bench;
 use cangauge::tasks::log::{Change, LogEvent, LogOptions, Mode, RecordingReport, Remark, TpdoChange, log};
 use std::collections::{BTreeMap, VecDeque};
-use std::ops::Range;
 use std::path::Path;
 use std::time::Duration;
 
@@ -218,6 +217,35 @@ fn lost_return_to_the_previous_state_is_noticed() {
     assert_eq!((commands, is_reported), (["000#0105"].map(str::to_owned).to_vec(), true));
 }
 
+/// After a restart, the answers with the vendor are lost until 4 s: the device is not taken for another one.
+#[test]
+fn restarted_node_is_read_again_until_it_answers_completely() {
+    let text = format!("clock = \"virtual\"\n{DPS}");
+    let mut inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
+    inner.attach(Other::new(&[(2000, "000#8105")]));
+    let is_lost = |received: &Received| {
+        let is_vendor = received.frame.data().get(1..4) == Some(&[0x18, 0x10, 1]);
+        is_vendor && (at(2000)..at(4000)).contains(&received.at.mono)
+    };
+    let mut bus = UnstableBus { is_lost, ..UnstableBus::new(inner, &[]) };
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(Mode::AsSent), &mut kept);
+    let mut signals: Vec<&str> = kept.rows.iter().filter_map(|row| row.split(',').nth(2)).collect();
+    signals.dedup();
+    assert_eq!(signals, ["pressure"]);
+    let has = |wanted: fn(&LogEvent) -> bool| kept.notes.iter().filter(|note| wanted(note)).count();
+    assert_eq!(has(|note| matches!(note, LogEvent::Unreadable(..))), 1, "{:?}", kept.notes);
+    assert_eq!(has(|note| *note == LogEvent::ReadAgain(node(5), Vec::new())), 1, "{:?}", kept.notes);
+    let seconds: Vec<u64> = kept
+        .rows
+        .iter()
+        .filter_map(|row| row.split(',').next()?.parse::<u64>().ok())
+        .map(|time| time / 1_000_000)
+        .collect();
+    assert!(seconds.contains(&1) && !seconds.contains(&3) && seconds.contains(&4), "{seconds:?}");
+    assert_eq!(outcome.expect("a recording").events.changes, 0);
+}
+
 #[test]
 fn unit_that_was_not_stored_is_not_used_after_a_restart() {
     // Set to bar without storing: after a restart the unit is psi.
@@ -324,7 +352,10 @@ fn lost_heartbeat_and_changed_state_are_reported() {
     assert_eq!((run.missing(), run.outcome.events.heartbeat_losses), (0, 0));
     let text = format!("clock = \"virtual\"\n{devices}");
     let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
-    let mut bus = UnstableBus { no_heartbeat: at(2000)..at(3000), ..UnstableBus::new(inner, &[]) };
+    let is_lost = |received: &Received| {
+        received.frame.id() == CanId::heartbeat(node(5)) && (at(2000)..at(3000)).contains(&received.at.mono)
+    };
+    let mut bus = UnstableBus { is_lost, ..UnstableBus::new(inner, &[]) };
     let mut kept = Kept::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(SYNC), &mut kept).expect("a recording");
     let lost = kept
@@ -342,14 +373,14 @@ struct UnstableBus {
     /// Events with their times. While the link is down no frame passes.
     events: VecDeque<(Mono, Event)>,
     up: bool,
-    /// The time in which heartbeats are lost.
-    no_heartbeat: Range<Mono>,
+    /// The frames that are lost.
+    is_lost: fn(&Received) -> bool,
 }
 
 impl UnstableBus {
     fn new(inner: MemoryBus, events: &[(u64, Event)]) -> UnstableBus {
         let events = events.iter().map(|(time, event)| (at(*time), *event)).collect();
-        UnstableBus { inner, events, up: true, no_heartbeat: Mono::START..Mono::START }
+        UnstableBus { inner, events, up: true, is_lost: |_| false }
     }
 }
 
@@ -382,8 +413,7 @@ impl Bus for UnstableBus {
             match self.inner.receive(until)? {
                 Event::Timeout if until < deadline => {}
                 Event::Frame(_) if !self.up => {}
-                Event::Frame(Received { frame, at })
-                    if frame.id() == CanId::heartbeat(node(5)) && self.no_heartbeat.contains(&at.mono) => {}
+                Event::Frame(received) if (self.is_lost)(&received) => {}
                 event => return Ok(event),
             }
         }
@@ -400,7 +430,10 @@ fn record_with_events(events: &[(u64, Event)]) -> (Kept, RecordingReport) {
     let mut inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
     inner.attach(Other::new(&[(2200, "000#8105")]));
     write(&mut Master::new(&mut inner, Timing::default()), UNIT, &BAR);
-    let mut bus = UnstableBus { no_heartbeat: at(2100)..at(2400), ..UnstableBus::new(inner, events) };
+    let is_lost = |received: &Received| {
+        received.frame.id() == CanId::heartbeat(node(5)) && (at(2100)..at(2400)).contains(&received.at.mono)
+    };
+    let mut bus = UnstableBus { is_lost, ..UnstableBus::new(inner, events) };
     let mut kept = Kept::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(Mode::AsSent), &mut kept);
     (kept, outcome.expect("a recording"))

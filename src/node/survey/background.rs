@@ -6,7 +6,7 @@ use crate::canopen::object::ObjectId;
 use crate::device::quirk::Quirk;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure, Ticket};
 use crate::node::Node;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A survey of one node that never waits.
 ///
@@ -20,6 +20,10 @@ pub struct BackgroundSurvey {
     pending: BTreeMap<Ticket, ObjectId>,
     /// The number of the latest objects without an answer, one after the other.
     silent: u8,
+    /// Whether the survey fails if an object has no valid answer that had one before.
+    insists: bool,
+    /// The optional objects without a valid answer.
+    unknown: BTreeSet<ObjectId>,
 }
 
 /// Why a run of the survey stopped.
@@ -38,6 +42,7 @@ impl From<Error> for Stop {
 /// The answers received so far.
 struct Known<'a, 'bus> {
     answers: &'a BTreeMap<ObjectId, Result<Answer, SdoError>>,
+    unknown: &'a mut BTreeSet<ObjectId>,
     master: &'a mut Master<'bus>,
 }
 
@@ -62,18 +67,18 @@ impl Ask for Known<'_, '_> {
         self.master.tolerates_two_devices()
     }
 
-    fn add_unknown(&mut self, node: NodeId, object: ObjectId) {
-        self.master.add_unknown(node, object);
+    fn add_unknown(&mut self, _: NodeId, object: ObjectId) {
+        self.unknown.insert(object);
     }
 }
 
 impl BackgroundSurvey {
-    /// Starts to read `node` again.
-    pub fn start(node: NodeId, overrides: &Overrides, master: &mut Master<'_>) -> BackgroundSurvey {
+    /// Starts to read `node` again. If it `insists`, an object without a valid answer that had one before is an error.
+    pub fn start(node: NodeId, overrides: &Overrides, insists: bool, master: &mut Master<'_>) -> BackgroundSurvey {
         let own = overrides.iter().filter(|(other, _)| **other == node);
         let overrides = own.map(|(&node, model)| (node, model.clone())).collect();
-        let mut survey =
-            BackgroundSurvey { node, overrides, answers: BTreeMap::new(), pending: BTreeMap::new(), silent: 0 };
+        let (answers, pending, unknown) = (BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
+        let mut survey = BackgroundSurvey { node, overrides, answers, pending, silent: 0, insists, unknown };
         // The first run has no answers: it only sends requests.
         let _ = survey.run(master);
         survey
@@ -115,9 +120,12 @@ impl BackgroundSurvey {
     }
 
     fn run(&mut self, master: &mut Master<'_>) -> Option<Result<Node, Error>> {
-        let mut known = Known { answers: &self.answers, master };
+        let mut known = Known { answers: &self.answers, unknown: &mut self.unknown, master };
         match survey_nodes(&mut known, &[self.node], &self.overrides) {
-            Ok(mut read) => read.pop().map(Ok),
+            Ok(mut read) => match self.no_longer_answered(master) {
+                Some(error) => Some(Err(Error::Sdo(error))),
+                None => read.pop().map(Ok),
+            },
             Err(Stop::Failed(error)) => Some(Err(error)),
             Err(Stop::Wanted(objects)) => {
                 for object in objects {
@@ -126,5 +134,16 @@ impl BackgroundSurvey {
                 None
             }
         }
+    }
+
+    /// The error of an object that was answered before. If there is none, the unknown objects are recorded.
+    fn no_longer_answered(&self, master: &mut Master<'_>) -> Option<SdoError> {
+        let before = master.unknown_objects().remove(&self.node).unwrap_or_default();
+        let error = |object| self.answers.get(object).and_then(|answer| answer.as_ref().err()).cloned();
+        let new = self.unknown.iter().filter(|object| self.insists && !before.contains(object)).find_map(error);
+        if new.is_none() {
+            self.unknown.iter().for_each(|&object| master.add_unknown(self.node, object));
+        }
+        new
     }
 }

@@ -20,6 +20,8 @@ use std::time::Duration;
 const WRITE_SETTLE_TIME: Duration = Duration::from_millis(500);
 /// Interval between two attempts to read a node that does not answer.
 const RETRY_INTERVAL: Duration = Duration::from_secs(1);
+/// In so many attempts, a node must answer all objects that it answered before.
+const COMPLETE_ATTEMPTS: u32 = 5;
 /// Shortest interval between two rereads of a node because frames were lost. An overloaded bus loses frames all the
 /// time.
 const FRAMES_LOST_INTERVAL: Duration = Duration::from_secs(60);
@@ -49,8 +51,8 @@ struct Pending {
     may_need_start: bool,
     /// Since when frames of the node are recorded although its setup is uncertain.
     recorded_since: Option<Mono>,
-    /// Whether a failed attempt was reported.
-    is_failure_reported: bool,
+    /// The number of failed attempts. The first one is reported.
+    failures: u32,
 }
 
 /// A node that was read again.
@@ -90,13 +92,7 @@ impl Rereads {
             }
             self.wrong_lengths.insert(node, now);
         }
-        let new = || Pending {
-            due: now,
-            survey: None,
-            may_need_start: false,
-            recorded_since: None,
-            is_failure_reported: false,
-        };
+        let new = || Pending { due: now, survey: None, may_need_start: false, recorded_since: None, failures: 0 };
         if why == RereadReason::FramesLost {
             self.pending.entry(node).or_insert_with(|| {
                 let earliest = self.frames_lost.get(&node).map_or(now, |&before| before + FRAMES_LOST_INTERVAL);
@@ -133,7 +129,8 @@ impl Rereads {
     pub(super) fn start_due(&mut self, now: Mono, master: &mut Master<'_>) {
         for (&node, pending) in &mut self.pending {
             if pending.survey.is_none() && pending.due <= now {
-                pending.survey = Some(BackgroundSurvey::start(node, &self.overrides, master));
+                let insists = pending.failures < COMPLETE_ATTEMPTS;
+                pending.survey = Some(BackgroundSurvey::start(node, &self.overrides, insists, master));
             }
         }
     }
@@ -160,8 +157,8 @@ impl Rereads {
             Err(error) => {
                 pending.survey = None;
                 pending.due = master.now() + RETRY_INTERVAL;
-                let is_first = !std::mem::replace(&mut pending.is_failure_reported, true);
-                is_first.then_some(Err((node, error)))
+                pending.failures += 1;
+                (pending.failures == 1).then_some(Err((node, error)))
             }
         }
     }

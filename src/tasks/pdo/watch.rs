@@ -259,7 +259,7 @@ impl<'a> Watcher<'a> {
         let mapped = self.decoder.mapped_length(id).map_or(0, |(_, mapped)| mapped);
         let is_longer = length > mapped && self.setup.is_none();
         if is_longer && !self.rereads.contains_key(&node) {
-            self.rereads.insert(node, Some(BackgroundSurvey::start(node, &self.overrides, master)));
+            self.rereads.insert(node, Some(BackgroundSurvey::start(node, &self.overrides, false, master)));
         }
         let is_read = matches!(self.rereads.get(&node), Some(Some(_)));
         if is_longer && is_read || !self.reported.insert((id, false)) {
