@@ -113,8 +113,13 @@ impl Signal {
 
     /// Whether the signal is a CiA 404 channel.
     pub fn has_channel(&self) -> bool {
-        (1..=199).contains(&self.channel)
+        is_channel(self.channel)
     }
+}
+
+/// Whether this is the number of a CiA 404 channel.
+pub fn is_channel(number: u8) -> bool {
+    (1..=199).contains(&number)
 }
 
 /// The process value objects of CiA 404 with the types that the standard gives them, the most precise first.

@@ -7,11 +7,13 @@ use crate::device::description::SignalEntry;
 use crate::device::profiles::{self, Measured, Step};
 use crate::device::scale::{Decimal, Scale};
 use crate::device::unit::Unit;
-use crate::measure::layout::{MeasuringRange, Rules, Scaling, Signal};
+use crate::measure::layout::{MeasuringRange, Rules, Scaling, Signal, is_channel};
 
 /// A signal of the description, without unit and digits.
 pub(crate) fn described(node: &Node, entry: &SignalEntry) -> Signal {
-    let scaling = entry.scale.map_or(Scaling::Digits, Scaling::Fixed);
+    let has_digits = entry.digits.is_some() || entry.unit.is_some() || is_channel(entry.channel);
+    let otherwise = if has_digits { Scaling::Digits } else { Scaling::Plain };
+    let scaling = entry.scale.map_or(otherwise, Scaling::Fixed);
     let mut rules = Rules { scaling, markers: entry.markers.clone(), ..Rules::default() };
     if let Some(bits) = &entry.status_bits {
         rules.status_bits = bits.clone();
@@ -98,10 +100,11 @@ pub(crate) fn values_of(row: Measured, number: Option<u64>) -> Vec<ObjectId> {
     (1..=count).map(|sub| ObjectId::new(row.index, sub)).collect()
 }
 
-/// The object with the step of a signal of a profile.
+/// The object with the step of a signal of a profile. A description can state another unit or factor.
 pub(crate) fn step(node: &Node, signal: &Signal) -> Option<Step> {
     let is_plain = !signal.has_channel() && signal.rules.scaling == Scaling::Plain;
-    profiles::step(node.identity.device_type?, signal.value_object.0).filter(|_| is_plain)
+    let step = profiles::step(node.identity.device_type?, signal.value_object.0).filter(|_| is_plain)?;
+    (signal.unit.is_none() || signal.unit == Unit::from_symbol(step.unit)).then_some(step)
 }
 
 /// Scales a signal by its step, if the device has one.

@@ -5,7 +5,7 @@ use super::text::safe;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
-use crate::measure::layout::Signal;
+use crate::measure::layout::{Scaling, Signal};
 use crate::tasks::describe::{Draft, DraftObject};
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -94,7 +94,9 @@ fn signal_entry(draft: &Draft, signal: &Signal, names: &mut BTreeSet<String>) ->
     ];
     let objects = objects.into_iter().filter_map(|(key, object)| Some((key, object.filter(|object| has(object))?)));
     lines.extend(objects.map(|(key, object)| format!("{key} = \"{object}\"")));
-    if !signal.has_channel() {
+    if let Scaling::Fixed(_) = signal.rules.scaling {
+        lines.push("# unit and factor: those of the profile".to_owned());
+    } else if !signal.has_channel() {
         let unit = signal.unit.map(|unit| unit.to_string()).unwrap_or_default();
         let note = "fill in: a fixed unit, or the object with its code";
         lines.push(format!("# unit = {}  # {note}", quoted(&unit)));

@@ -67,6 +67,18 @@ fn inclinometers_show_degrees() {
     assert_eq!(values(bench.run("read 5")), ["5 slope-long16 -12.34 deg", "5 slope-lateral16 5.00 deg"]);
     bench.run("read 5 slope-long16").prints("-12.34\n");
     bench.run("read 5 0x6010").prints("-1234\n");
+    let info = bench.run("info 5 --format json").exit(0).json();
+    assert!(info[0]["signals"][0]["range"].is_null(), "{info:?}");
+    // A signal of a description has the step of the profile too, unless the description states another one.
+    let new = bench.run("devices new 5").exit(0).stdout;
+    std::fs::write(bench.path("new.toml"), &new).expect("written");
+    assert_eq!(
+        values(bench.run("--device new.toml read 5")),
+        ["5 slope-long16 -12.34 deg", "5 slope-lateral16 5.00 deg"]
+    );
+    let own = new.replacen("value = \"0x6010:0\"", "value = \"0x6010:0\"\nunit = \"deg\"\nfactor = 0.1", 1);
+    std::fs::write(bench.path("factor.toml"), own).expect("written");
+    bench.run("--device factor.toml read 5 slope-long16").prints("-123.4\n");
     let log = bench.run("log 5 --sync 100ms --count 2").exit(0);
     assert_eq!(rows(&log.stdout, 2), ["slope-long16,-12.34,deg,", "slope-lateral16,5.00,deg,"]);
     let wide = bench.run("log 5 slope-lateral16 --sync 100ms --count 1 --layout wide").exit(0);
