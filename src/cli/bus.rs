@@ -9,6 +9,7 @@ use crate::bus::claim::Claim;
 use crate::bus::remote::{SerialAdapter, adapters};
 use crate::output::failure::ErrorMessage;
 use crate::output::interfaces::{BitRateReport, Interface, change, tried_line};
+use crate::output::progress::Activity;
 use crate::tasks::Failure;
 use crate::tasks::detect::{By, DetectFailure, How, detect};
 use clap::{Args, Subcommand};
@@ -126,12 +127,15 @@ impl Detect {
         let mut bus = open::open_as(global, spec, true)?;
         let console = global.console();
         let mut is_asking = false;
+        let activity = Activity::new(global.shows_progress(), "trying bit rates");
         let detection = detect(&mut *bus, self.active, self.time_per_rate.0, &mut |tried| {
             if tried.how == How::Asking && !std::mem::replace(&mut is_asking, true) {
-                console.note("no valid frame; now sending requests, which disturbs nodes at other bit rates");
+                let text = "no valid frame; now sending requests, which disturbs nodes at other bit rates";
+                activity.above(|| console.note(text));
             }
-            console.note(&tried_line(tried));
+            activity.above(|| console.note(&tried_line(tried)));
         });
+        drop(activity);
         let interface = bus.name().to_owned();
         let finished = bus.finish().or_fail();
         let detection = detection?;

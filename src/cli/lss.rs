@@ -12,6 +12,7 @@ use crate::node::Overrides;
 use crate::output::failure::ErrorMessage;
 use crate::output::lss::Identified;
 use crate::output::notes;
+use crate::output::progress::Activity;
 use crate::tasks::lss::{
     Descriptions, LssCause, LssFailure, LssRange, Target, TargetError, activate, identify, inquire, scan, store,
 };
@@ -164,7 +165,10 @@ fn failed(cause: LssCause) -> anyhow::Error {
 }
 
 fn run_scan(global: &Global) -> anyhow::Result<()> {
-    let found = global.with_master(|master| Ok(scan(master, &mut |note| print_note(global, &note))?))?;
+    let found = global.with_master(|master| {
+        let activity = Activity::new(global.shows_progress(), "searching for devices");
+        Ok(scan(master, &mut |note| activity.above(|| print_note(global, &note)))?)
+    })?;
     global.print(&found)?;
     if found.is_empty() { Err(failed(LssCause::NoDevice)) } else { Ok(()) }
 }

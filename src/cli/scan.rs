@@ -6,6 +6,7 @@ use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
+use crate::output::progress::Activity;
 use crate::tasks::Failure;
 use crate::tasks::scan::{Found, ScanFailure, listen, scan};
 use clap::Args;
@@ -51,6 +52,8 @@ impl Scan {
         let overrides = descriptions::overrides(global, &nodes)?;
         let (found, took) = global.with_master(|master| {
             let begin = master.now();
+            let text = if self.passive { "listening" } else { "asking the nodes" };
+            let _activity = Activity::new(global.shows_progress(), text);
             let found = if self.passive {
                 // A replayed recording is read to its end.
                 let default = if master.bus().is_live() { LISTEN_TIMEOUT } else { Duration::MAX };

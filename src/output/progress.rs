@@ -189,6 +189,9 @@ impl TermLike for Screen {
     }
 }
 
+/// The interval of the redraws of an [`Activity`].
+const TICK: Duration = Duration::from_millis(200);
+
 /// The progress of one transfer, shown only for long transfers.
 #[derive(Debug)]
 pub struct TransferProgress {
@@ -226,6 +229,35 @@ impl TransferProgress {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// A line on stderr while a command works, with the time.
+#[derive(Debug)]
+pub struct Activity(ProgressBar);
+
+impl Activity {
+    /// `asking all nodes`; hidden unless `show`.
+    pub fn new(show: bool, what: &'static str) -> Activity {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        if show {
+            bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_SECOND));
+            bar.set_style(style("{spinner} {msg} ({elapsed})"));
+            bar.set_message(what);
+            bar.enable_steady_tick(TICK);
+        }
+        Activity(bar)
+    }
+
+    /// Prints other lines above.
+    pub fn above(&self, print: impl FnOnce()) {
+        self.0.suspend(print);
+    }
+}
+
+impl Drop for Activity {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
     }
 }
 

@@ -127,3 +127,27 @@ fn trace_on_a_full_disk_is_an_error() {
     let done = bench.finish(&mut bench.command(&words)).exit(8);
     assert!(done.stderr.contains("No space left on device"), "{}", done.stderr);
 }
+
+/// What a terminal receives from a command on the simulated bus.
+#[cfg(target_os = "linux")]
+fn on_terminal(line: &str) -> String {
+    let command = format!("{} -b sim {line}", env!("CARGO_BIN_EXE_cangauge"));
+    let mut script = Command::new("script");
+    script.env_remove("NO_COLOR").env("TERM", "xterm").args(["-qec", &command, "/dev/null"]).stdin(Stdio::null());
+    String::from_utf8(script.output().expect("script, of util-linux").stdout).expect("text")
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_terminal_shows_colours_and_progress() {
+    let check = "check 1 'pressure > 0 bar' 'temperature < 1 degC'";
+    let colored = on_terminal(check);
+    assert!(colored.contains("\u{1b}[32mok\u{1b}[0m    pressure > 0 bar"), "{colored:?}");
+    assert!(colored.contains("\u{1b}[1m\u{1b}[31mFAIL\u{1b}[0m  temperature < 1 degC"), "{colored:?}");
+    for plain in [format!("--color never {check}"), format!("{check} --format json")] {
+        assert!(!on_terminal(&plain).lines().next().unwrap_or_default().contains('\u{1b}'), "{plain}");
+    }
+    assert!(on_terminal("scan 1,2").contains("asking the nodes"));
+    let quiet = on_terminal("scan 1,2 --progress never --color never");
+    assert!(!quiet.contains("asking") && !quiet.contains('\u{1b}'), "{quiet:?}");
+}
