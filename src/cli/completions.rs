@@ -3,8 +3,9 @@
 use super::args::Override;
 use super::exit::{FileError, open_stdout, stdout};
 use super::file::ReportFile;
-use super::{Cli, Global, descriptions, program};
+use super::{Cli, Global, descriptions, open, program};
 use crate::bus::claim::Claim;
+use crate::bus::remote::adapters;
 use crate::canopen::id::NodeId;
 use crate::device::catalog::{self, Model};
 use crate::device::dictionary::Entry;
@@ -12,9 +13,9 @@ use crate::device::standard;
 use crate::node::offline::offline;
 use crate::output::failure::ErrorMessage;
 use clap::builder::PossibleValue;
-use clap::{Args, Command, CommandFactory, ValueEnum};
+use clap::{Arg, Args, Command, CommandFactory, ValueEnum};
 use clap_complete::Shell;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::env;
 use std::fs;
 use std::io::Write;
@@ -23,8 +24,9 @@ use std::sync::Arc;
 
 /// Print or install the completion script for a shell
 ///
-/// "install" writes the script to the user's folder of bash, zsh or fish, and prints its path. The script completes commands, options, device names, units, and the names of signals and objects: those in --device
-/// and --eds, else those of the built-in descriptions. It uses no bus.
+/// "install" writes the script to the user's folder of bash, zsh or fish, and prints its path.
+/// The script completes commands, options, buses, device names, units, and the names of signals and objects: those in
+/// --device and --eds, else those of the built-in descriptions. It uses no bus.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge completions install\n  cangauge completions bash > cangauge.bash")]
 pub(crate) struct Completions {
@@ -80,7 +82,8 @@ impl Completions {
             }
             (Some(Action::Print(shell)), None) => script(shell),
             (None, _) => {
-                names(&self.line, global).into_iter().flat_map(|name| format!("{name}\n").into_bytes()).collect()
+                let line = |(name, about): (String, String)| format!("{name}\t{about}").trim_end().to_owned() + "\n";
+                names(&self.line, global).into_iter().map(line).collect::<String>().into_bytes()
             }
         };
         open_stdout()?.write_all(&text).map_err(stdout)
@@ -110,71 +113,100 @@ fn install(shell: Option<Shell>, global: &Global) -> anyhow::Result<Vec<u8>> {
     Ok(format!("{}\n", path.display()).into_bytes())
 }
 
-/// The names after the generated functions: a function that asks the program for names.
-const BASH: &str = r#"
-# Names of signals, objects, devices and units come from the program. COMP_WORDS would split ai-input-pv:1.
-_cangauge_names() {
-    _cangauge "$@"
+/// The scripts ask the program, which knows the command line.
+const BASH: &str = r#"# COMP_WORDS would split sim:mh4@5 and ai-input-pv:1.
+_cangauge() {
     local -a line
     local text="${COMP_LINE:0:COMP_POINT}" word name
     read -ra line <<< "$text"
     [[ "$text" == *[[:space:]] ]] && line+=("")
     word="${line[${#line[@]} - 1]}"
-    while IFS= read -r name; do
-        COMPREPLY+=("${name#"${word%"${word##*:}"}"}")
+    COMPREPLY=()
+    while IFS=$'\t' read -r name _; do
+        COMPREPLY+=("${name#"${word%"${word##*[:=@]}"}"}")
     done < <(cangauge completions -- "${line[@]:1}" 2>/dev/null)
 }
 
-complete -F _cangauge_names -o bashdefault -o default cangauge
+complete -F _cangauge -o bashdefault -o default cangauge
 "#;
 
-const ZSH: &str = r#"
-    # Names of signals, objects, devices and units come from the program.
-    local -a names
-    names=(${(f)"$(cangauge completions -- "${(@)words[2,CURRENT]}" 2>/dev/null)"})
-    (( ${#names} )) && compadd -a names
+const ZSH: &str = r#"#compdef cangauge
+
+_cangauge() {
+    local -a found
+    found=("${(@f)$(cangauge completions -- "${(@)words[2,CURRENT]}" 2>/dev/null)}")
+    if [[ -z "$found" ]]; then
+        _files
+        return
+    fi
+    found=("${(@)found//:/\\:}")
+    found=("${(@)found/$'\t'/:}")
+    _describe cangauge found
+}
+
+if [ "$funcstack[1]" = "_cangauge" ]; then
+    _cangauge "$@"
+else
+    compdef _cangauge cangauge
+fi
 "#;
 
-const FISH: &str = r"
-# Names of signals, objects, devices and units come from the program.
-complete -c cangauge -a '(cangauge completions -- (commandline -opc)[2..-1] (commandline -ct) 2>/dev/null)'
+const FISH: &str = r"function __cangauge
+    set -l word (commandline -ct)
+    set -l found (cangauge completions -- (commandline -opc)[2..-1] $word 2>/dev/null)
+    if set -q found[1]
+        string join \n -- $found
+    else
+        __fish_complete_path $word
+    end
+end
+
+complete -c cangauge -f -a '(__cangauge)'
 ";
 
 /// The completion script for a shell.
 pub fn script(shell: Shell) -> Vec<u8> {
-    let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), "cangauge", &mut script);
-    let script = String::from_utf8_lossy(&script).into_owned();
-    let script = match shell {
-        Shell::Bash => script + BASH,
-        Shell::Zsh => script.replacen("_cangauge() {\n", &format!("_cangauge() {{{ZSH}\n"), 1),
-        Shell::Fish => script + FISH,
-        _ => script,
-    };
-    script.into_bytes()
+    match shell {
+        Shell::Bash => BASH.into(),
+        Shell::Zsh => ZSH.into(),
+        Shell::Fish => FISH.into(),
+        _ => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "cangauge", &mut script);
+            script
+        }
+    }
 }
 
 /// Units that are offered for `--in` and `unit`.
-const UNITS: [&str; 12] = ["bar", "mbar", "Pa", "hPa", "kPa", "MPa", "psi", "degC", "degF", "K", "deg", "mm"];
+const UNITS: &[&str] = &["bar", "mbar", "Pa", "hPa", "kPa", "MPa", "psi", "degC", "degF", "K", "deg", "mm"];
 
 /// What a word can be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
+    Bus,
+    /// A CAN interface of this computer.
+    Interface,
     Device,
-    Unit,
+    Words(&'static [&'static str]),
     /// A signal, or an object if the flag is set.
     Name(bool),
     Other,
 }
 
-/// The place of the word after `before`: positional words of a command, and the option whose value it is.
+/// The place of a word: the command with the number of words after it, and the option whose value it is.
 fn place(command: &[&str], count: usize, option: Option<&str>) -> Place {
     match (option, command) {
+        (Some("bus"), _) => Place::Bus,
         (Some("device"), _) | (None, ["devices", "show"] | ["sim"]) => Place::Device,
-        (Some("in"), _) => Place::Unit,
+        (Some("in"), _) => Place::Words(UNITS),
+        (Some("transmission"), _) => Place::Words(&["acyclic", "event", "sync:1", "timer"]),
         (Some(_), _) => Place::Other,
+        (None, ["bus", "detect"]) if count == 0 => Place::Bus,
+        (None, ["bus", _]) if count == 0 => Place::Interface,
         (None, ["objects"]) if count == 0 => Place::Device,
-        (None, ["unit"]) if count == 2 => Place::Unit,
+        (None, ["pdo", "show" | "map"]) if count == 1 => Place::Words(&["1", "2", "3", "4"]),
+        (None, ["unit"]) if count == 2 => Place::Words(UNITS),
         (None, ["objects"] | ["sdo", "read" | "write"]) if count > 0 => Place::Name(true),
         (None, ["log" | "read" | "check"]) if count > 0 => Place::Name(true),
         (None, ["pdo", "map"]) if count > 1 => Place::Name(true),
@@ -183,20 +215,22 @@ fn place(command: &[&str], count: usize, option: Option<&str>) -> Place {
     }
 }
 
-/// The names that can complete the last word.
-fn names(line: &[String], global: &Global) -> BTreeSet<String> {
-    let Some((last, before)) = line.split_last() else { return BTreeSet::new() };
-    let program = program();
+/// The words that can be the last one, some with a description. None if it is a file.
+fn names(line: &[String], global: &Global) -> BTreeMap<String, String> {
+    let Some((last, before)) = line.split_last() else { return BTreeMap::new() };
+    let mut program = program();
+    // Arguments of nested commands are made lazily.
+    program.build();
     let mut command = &program;
-    let (mut path, mut positional, mut option) = (Vec::new(), Vec::new(), None);
+    let (mut path, mut positional, mut option) = (Vec::new(), Vec::new(), None::<&Arg>);
     let mut sources = Vec::new();
     for word in before {
-        if let Some(name) = option.take() {
-            sources.extend(source(name, word));
+        if let Some(option) = option.take() {
+            sources.extend(source(option.get_long().unwrap_or_default(), word));
         } else if let Some((name, value)) = word.strip_prefix("--").and_then(|word| word.split_once('=')) {
             sources.extend(source(name, value));
         } else if word.len() > 1 && word.starts_with('-') {
-            option = value_option(&program, command, word);
+            option = find_option(&program, command, word).filter(|option| option.get_action().takes_values());
         } else if let Some(sub) = command.find_subcommand(word).filter(|_| positional.is_empty()) {
             path.push(sub.get_name());
             command = sub;
@@ -204,30 +238,85 @@ fn names(line: &[String], global: &Global) -> BTreeSet<String> {
             positional.push(word.as_str());
         }
     }
-    let split = last.strip_prefix("--").and_then(|word| word.split_once('='));
-    let (option, prefix) = split.map_or((option, ""), |(name, _)| (Some(name), &last[..name.len() + 3]));
-    let found: Vec<String> = match place(&path, positional.len(), option) {
-        Place::Device => catalog::all().map(|model| model.description.name.clone()).collect(),
-        Place::Unit => UNITS.map(str::to_owned).to_vec(),
-        Place::Name(with_objects) => {
-            let own = positional.first().filter(|_| path == ["objects"]).map(|device| (*device, false));
-            let models: Vec<_> =
-                own.into_iter().chain(sources).filter_map(|(file, is_eds)| model(file, is_eds, global)).collect();
-            names_of(&models, with_objects)
-        }
-        Place::Other => Vec::new(),
-    };
-    found.into_iter().map(|name| format!("{prefix}{name}")).filter(|name| name.starts_with(last.as_str())).collect()
+    let split = last.starts_with("--").then(|| last.split_once('=')).flatten();
+    let prefix = split.map_or("", |(name, _)| &last[..=name.len()]);
+    let option = split.map_or(option, |(name, _)| find_option(&program, command, name));
+    let argument = option.or_else(|| command.get_positionals().nth(positional.len()));
+    let plain = |names: Vec<String>| names.into_iter().map(|name| (name, String::new())).collect();
+    let mut found: Vec<(String, String)> =
+        match place(&path, positional.len(), option.and_then(|option| option.get_long())) {
+            Place::Bus => plain(buses()),
+            Place::Interface => plain(open::interfaces().into_iter().map(|(name, _)| name).collect()),
+            Place::Device => plain(device_names().collect()),
+            Place::Words(words) => plain(words.iter().map(ToString::to_string).collect()),
+            Place::Name(with_objects) => {
+                let own = positional.first().filter(|_| path == ["objects"]).map(|device| (*device, false));
+                let sources = own.into_iter().chain(sources);
+                let models: Vec<_> = sources.filter_map(|(file, is_eds)| model(file, is_eds, global)).collect();
+                plain(names_of(&models, with_objects))
+            }
+            Place::Other => argument.map(values).unwrap_or_default(),
+        };
+    if option.is_none() && positional.is_empty() {
+        found.extend(visible(command.get_subcommands()));
+    }
+    let takes_file = argument.is_some_and(|argument| {
+        argument.get_value_names().is_some_and(|names| names.iter().any(|name| name.contains("FILE")))
+    });
+    let is_nothing = last.is_empty() && found.is_empty() && !takes_file;
+    if option.is_none() && (last.starts_with('-') || is_nothing) {
+        found.extend(options(command).chain(options(&program)));
+    }
+    let found = found.into_iter().map(|(name, about)| (format!("{prefix}{name}"), about));
+    found.filter(|(name, _)| name.starts_with(last.as_str())).collect()
 }
 
-/// The option that takes the next word as its value.
-fn value_option<'a>(program: &'a Command, command: &'a Command, word: &str) -> Option<&'a str> {
-    let arguments = || command.get_arguments().chain(program.get_arguments());
-    let named = match word.strip_prefix("--") {
-        Some(long) => arguments().find(|argument| argument.get_long() == Some(long)),
-        None => arguments().find(|argument| argument.get_short() == word.chars().nth(1) && word.len() == 2),
+/// The subcommands that are not hidden.
+fn visible<'a>(commands: impl Iterator<Item = &'a Command>) -> impl Iterator<Item = (String, String)> {
+    let about = |command: &Command| command.get_about().map(ToString::to_string).unwrap_or_default();
+    commands
+        .filter(|command| !command.is_hide_set())
+        .map(move |command| (command.get_name().to_owned(), about(command)))
+}
+
+/// The long options of a command that are not hidden.
+fn options(command: &Command) -> impl Iterator<Item = (String, String)> {
+    let help = |argument: &Arg| {
+        let text = argument.get_help().map(ToString::to_string).unwrap_or_default();
+        text.split(['(', '[', ';']).next().unwrap_or_default().to_owned()
     };
-    named.filter(|argument| argument.get_action().takes_values()).and_then(|argument| argument.get_long())
+    let shown = command.get_arguments().filter(|argument| !argument.is_hide_set());
+    shown.filter_map(move |argument| Some((format!("--{}", argument.get_long()?), help(argument))))
+}
+
+/// The values of an argument that has a fixed set of them.
+fn values(argument: &Arg) -> Vec<(String, String)> {
+    let shown = argument.get_possible_values().into_iter().filter(|value| !value.is_hide_set());
+    shown
+        .map(|value| (value.get_name().to_owned(), value.get_help().map(ToString::to_string).unwrap_or_default()))
+        .collect()
+}
+
+fn device_names() -> impl Iterator<Item = String> {
+    catalog::all().map(|model| model.description.name.clone())
+}
+
+/// The interfaces of this computer, the simulated devices, and the starts of other buses.
+fn buses() -> Vec<String> {
+    let mut all: Vec<String> = open::interfaces().into_iter().map(|(name, _)| name).collect();
+    all.extend(["sim", "replay:", "slcan:", "socketcand://"].map(str::to_owned));
+    all.extend(adapters().into_iter().map(|adapter| format!("slcan:{}@250k", adapter.path)));
+    all.extend(device_names().map(|name| format!("sim:{name}@1")));
+    all
+}
+
+/// The option `-t` or `--timeout`, of the command or of the program.
+fn find_option<'a>(program: &'a Command, command: &'a Command, word: &str) -> Option<&'a Arg> {
+    let mut arguments = command.get_arguments().chain(program.get_arguments());
+    match word.strip_prefix("--") {
+        Some(long) => arguments.find(|argument| argument.get_long() == Some(long)),
+        None => arguments.find(|argument| argument.get_short() == word.chars().nth(1) && word.len() == 2),
+    }
 }
 
 /// The description or EDS that an option names.

@@ -227,13 +227,14 @@ fn socketcan(name: &str, _: bool) -> Result<Box<dyn Bus>, BusError> {
     Err(BusError::Unsupported(format!("{name}: this system has no SocketCAN")))
 }
 
+/// The CAN interfaces of this computer, and whether each is up.
 #[cfg(all(target_os = "linux", not(without_socketcan)))]
-fn interfaces() -> Vec<(String, bool)> {
+pub(super) fn interfaces() -> Vec<(String, bool)> {
     crate::bus::socketcan::interfaces().into_iter().map(|interface| (interface.name, interface.up)).collect()
 }
 
 #[cfg(not(all(target_os = "linux", not(without_socketcan))))]
-fn interfaces() -> Vec<(String, bool)> {
+pub(super) fn interfaces() -> Vec<(String, bool)> {
     Vec::new()
 }
 

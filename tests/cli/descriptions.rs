@@ -341,9 +341,34 @@ fn completion_offers_names_of_descriptions_and_files() {
     offers(&["read", "5", "pressure", "--in", "k"], &["kPa"]);
     offers(&["unit", "5", "pressure", "p"], &["psi"]);
     offers(&["devices", "show", "hy"], &["hydac"]);
-    for words in [&["lo"][..], &["log", "1"], &["read", "5", "--eds", "x"], &["--eds", "none.eds", "-t", ""]] {
+    for words in [&["log", "1"][..], &["read", "5", "--eds", "x"], &["--eds", "none.eds", "-t", ""]] {
         assert_eq!(completed(&bench, words), [""; 0], "{words:?}");
     }
+}
+
+#[test]
+fn completion_offers_commands_options_and_values() {
+    let bench = Bench::of(super::ALL);
+    let offers = |line: &str, names: &[&str]| {
+        let found = completed(&bench, &line.split(' ').collect::<Vec<_>>());
+        let found: Vec<&str> = found.iter().filter_map(|found| found.split('\t').next()).collect();
+        names.iter().for_each(|name| assert!(found.contains(name), "{line} {name}: {found:?}"));
+    };
+    // The value of an option is no command.
+    offers("-b sim re", &["read", "restore"]);
+    offers("-b sim:mh4@5 log 5 --sy", &["--sync"]);
+    offers("log 5 --ex", &["--expect"]);
+    offers("read 5 ", &["pressure"]);
+    offers("read ", &["--timeout", "--in"]);
+    offers("log 5 --layout ", &["long", "wide"]);
+    offers("--format=j", &["--format=json"]);
+    offers("-b s", &["sim", "sim:mh4@1", "slcan:", "socketcand://"]);
+    offers("pdo map 5 ", &["1", "4"]);
+    offers("pdo map 5 1 --transmission ", &["sync:1", "timer"]);
+    offers("lss ", &["scan", "set-id"]);
+    assert!(completed(&bench, &["sca"])[0].starts_with("scan\tList every node"), "{:?}", completed(&bench, &["sca"]));
+    assert_eq!(completed(&bench, &["--eds", ""]), [""; 0], "a file");
+    assert_eq!(completed(&bench, &["plot", ""]), [""; 0], "a file");
 }
 
 #[test]
@@ -353,7 +378,7 @@ fn bash_completes_names_with_colons() {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/completions/cangauge.bash");
     let text = format!(
         "PATH={}:$PATH; source {script}; COMP_LINE='cangauge --eds x.eds read 5 sensor-a:'; COMP_POINT=${{#COMP_LINE}}; \
-         COMP_WORDS=(cangauge --eds x.eds read 5 sensor-a :); COMP_CWORD=6; _cangauge_names cangauge : sensor-a; \
+         COMP_WORDS=(cangauge --eds x.eds read 5 sensor-a :); COMP_CWORD=6; _cangauge cangauge : sensor-a; \
          printf '%s\\n' \"${{COMPREPLY[@]}}\"",
         program.parent().expect("a folder").display()
     );

@@ -2,6 +2,8 @@
 
 use super::{ALL, Bench, closed_pipe};
 use std::fs;
+#[cfg(target_os = "linux")]
+use std::process::Command;
 use std::process::Stdio;
 
 /// Commands that print to stdout.
