@@ -274,7 +274,7 @@ def main(program, interface=None):
 
     # They mostly wait, so they run side by side. With an interface, only it is compared.
     with ThreadPoolExecutor() as pool:
-        checks = () if interface else (our_server, bridge, adapter, mute_adapter, foreign_adapter)
+        checks = () if interface else (our_server, bridge, adapter, unplugged_adapter, mute_adapter, foreign_adapter)
         running = [pool.submit(check, program, directory, expected, times) for check in checks]
         for one in running:
             one.result()
@@ -306,6 +306,30 @@ def adapter(program, directory, expected, times):
         bus = f"slcan:{device.path}@250k"
         compare("slcan, an adapter from the command set", results(program, bus), expected)
         times["slcan"] = round_trip(program, bus)
+
+
+def unplugged_adapter(program, directory, expected, times):
+    """The adapter is unplugged during log, and plugged in again as another terminal with the same name."""
+    name = os.path.join(directory, "ttyACM0")
+    command = [program, "-b", f"slcan:{name}@250k", "log", "127", "pressure", "--poll", "100ms", "--duration", "8s"]
+    with served(program, directory) as port:
+        with client(port) as behind, Adapter(behind) as device:
+            os.symlink(device.path, name)
+            log = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            before = [log.stdout.readline() for _ in range(10)]
+        os.close(device.master)
+        os.close(device.slave)
+        os.remove(name)
+        time.sleep(1)
+        with client(port) as behind, Adapter(behind) as device:
+            os.symlink(device.path, name)
+            after, notes = log.communicate(timeout=60)
+    rows = [line.split(",") for line in before + after.splitlines()][1:]
+    times = [float(row[1]) for row in rows if row[4]]
+    gap = max(right - left for left, right in zip(times, times[1:]))
+    assert log.returncode == 0 and 1 < gap < 6 and times[-1] > 7, (log.returncode, gap, times, notes)
+    assert "the interface went down" in notes and "the interface is up again" in notes, notes
+    print(f"ok   slcan, an adapter that is unplugged: a gap of {gap:.1f} s")
 
 
 # Each command waits for 2.5 s until such an adapter counts as silent.
