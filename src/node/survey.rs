@@ -285,10 +285,10 @@ fn read_tpdos<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<
         .collect();
     let mut words = reader.values(&items)?.into_iter();
     for ((&(at, number, cob_id), values), &count) in found.iter().zip(values.chunks(3)).zip(&counts) {
-        let mapping: Option<Vec<MappingEntry>> = entries(count)
-            .map(|_| words.next().flatten())
-            .map(|word| unsigned(word.as_ref()).map(MappingEntry::from_word))
-            .collect();
+        // All words of this TPDO are taken, also after a missing one: the next words belong to the next TPDO.
+        let own: Vec<Option<u32>> = entries(count).map(|_| unsigned(words.next().flatten().as_ref())).collect();
+        let mapping: Option<Vec<MappingEntry>> =
+            own.into_iter().map(|word| word.map(MappingEntry::from_word)).collect();
         let code: Option<u8> = unsigned(values[2].as_ref());
         if cob_id.is_valid() && (mapping.is_none() || code.is_none_or(|code| code > 64)) {
             nodes[at].not_decoded.push((number, code));

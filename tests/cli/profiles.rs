@@ -201,6 +201,31 @@ fn described_signals_have_their_own_scale_and_status() {
     bench.run("--device own.toml unit 5 flow bar").exit(4);
 }
 
+/// The mapping of the other TPDO is not shifted.
+#[test]
+fn a_missing_mapping_entry_affects_its_tpdo_only() {
+    let objects = [
+        ("0x7130:1", "i16", "ro", "111"),
+        ("0x7130:2", "i16", "ro", "222"),
+        ("0x6132:1", "u8", "ro", "0"),
+        ("0x6132:2", "u8", "ro", "0"),
+        ("0x1A00:3", "u32", "rw", "0x71300110"),
+        ("0x1801:1", "u32", "rw", "\"$NODEID+0x40000280\""),
+        ("0x1801:2", "u8", "rw", "1"),
+        ("0x1A01:0", "u8", "rw", "1"),
+        ("0x1A01:1", "u32", "rw", "0x71300210"),
+    ];
+    let text = device("0x00020194", &objects, &["0x71300110"]);
+    let three = text.replacen(
+        "access = \"rw\"\npdo = false\ndefault = 1\n[[object]]\nat = \"0x1A00:1\"",
+        "access = \"rw\"\npdo = false\ndefault = 3\n[[object]]\nat = \"0x1A00:1\"",
+        1,
+    );
+    assert_ne!(three, text);
+    let log = bench(&three).run("log 5 --sync 100ms --count 2").exit(0);
+    assert_eq!(rows(&log.stdout, 2), ["ch2,222,,", "ch2,222,,"]);
+}
+
 /// A wrong power of ten must not pass a check.
 #[test]
 fn integer_with_unknown_or_impossible_digits_passes_no_check() {
