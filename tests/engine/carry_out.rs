@@ -10,6 +10,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::nmt::NmtState;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::pdo::TpdoNumber;
+use cangauge::device::config_file::Document;
 use cangauge::device::unit::Unit;
 use cangauge::master::{Master, Timing};
 use cangauge::measure::expression::Expression;
@@ -23,7 +24,7 @@ use cangauge::tasks::lss::{self, Descriptions, Job, LssAddress, LssRange, Reques
 use cangauge::tasks::nmt::StateEvent;
 use cangauge::tasks::pdo::{self, Item, PdoRequest, Settings, Trigger, WatchEvent};
 use cangauge::tasks::settings::{self, errors, filter, info, limits, minmax, unit};
-use cangauge::tasks::{Failure, autozero, check, detect, nmt, read, restore, scan, sdo, store};
+use cangauge::tasks::{Failure, autozero, check, config, detect, nmt, read, restore, scan, sdo, store};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -45,6 +46,8 @@ pub(crate) enum Claim {
         retimed: bool,
     },
     Mapped(Settings),
+    /// The objects of the settings with their values.
+    Configured(Vec<(ObjectId, Vec<u8>)>),
     Stored,
     /// The bit rate of the bus.
     Detected(Option<u32>),
@@ -89,6 +92,17 @@ impl Observer for Observations {
     fn tick(&mut self, _: Stamp, _: u64) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
+}
+
+/// A journal of a program that is not continued.
+struct Unkept;
+
+impl config::Journal for Unkept {
+    fn begin(&mut self, _: &config::Snapshot) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn finish(&mut self) {}
 }
 
 pub(crate) fn node(id: u8) -> NodeId {
@@ -271,6 +285,24 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
                 cob_id: *cob_id,
             };
             Claim::Mapped(pdo::map(master, &request, *keep, &none)?.shown.settings)
+        }
+        Command::Configure { node: id, heartbeat_ms, timer_ms, digits } => {
+            let mut text = format!("[node]\nheartbeat = \"{heartbeat_ms}ms\"\n");
+            let mut wanted = vec![(ObjectId::new(0x1017, 0), heartbeat_ms.to_le_bytes().to_vec())];
+            if let Some(digits) = digits {
+                text += &format!("[signal.pressure]\ndigits = {digits}\n");
+                wanted.push((ObjectId::new(0x6132, 1), vec![*digits]));
+            }
+            if let Some(timer) = timer_ms {
+                text += &format!("[tpdo.1]\nevent-timer = \"{timer}ms\"\n");
+                wanted.push((ObjectId::new(0x1800, 5), timer.to_le_bytes().to_vec()));
+            }
+            let document = Document::parse(&text).expect("TOML");
+            let before = config::read(master, node(*id), &none, Some(&config::File::Settings(document.clone())))?;
+            // Mistakes: what this device does not have.
+            let Ok(file) = before.check(&document) else { return Ok(Claim::Nothing) };
+            config::apply(master, before, &file, &config::Options::default(), &none, &mut Unkept)?;
+            Claim::Configured(wanted)
         }
         Command::Autozero { node: id, channel, force, store, dry_run } => {
             let options = autozero::Options {

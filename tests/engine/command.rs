@@ -137,6 +137,13 @@ pub(crate) enum Command {
         cob_id: Option<u16>,
         keep: bool,
     },
+    /// `config apply` with these settings.
+    Configure {
+        node: u8,
+        heartbeat_ms: u16,
+        timer_ms: Option<u16>,
+        digits: Option<u8>,
+    },
     Autozero {
         node: u8,
         channel: Option<u8>,

@@ -42,6 +42,7 @@ pub(super) fn named(spec: &Spec) -> BTreeSet<u8> {
         | Command::NmtProbe { node }
         | Command::Startup { node, .. }
         | Command::Map { node, .. }
+        | Command::Configure { node, .. }
         | Command::Autozero { node, .. }
         | Command::Store { node, .. }
         | Command::Restore { node, .. }

@@ -109,6 +109,19 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Claim, after: &[DeviceSt
                 }
             }
         }
+        (Claim::Configured(settings), Command::Configure { node, .. })
+            if !spec.is_changed_by_others() && !spec.falsifies_data() && !spec.shares_node_ids() =>
+        {
+            for station in run.bus.bus.inner_mut().inner_mut().stations_mut::<FaultyDevice>() {
+                for (object, wanted) in settings.iter().filter(|_| spec.devices[station.place].node == Some(*node)) {
+                    let found = station.device.value(*object, settled);
+                    if found.as_ref() != Some(wanted) {
+                        let difference = format!("{object} is {found:02X?}, not {wanted:02X?}");
+                        violations.push(("has the requested settings", difference));
+                    }
+                }
+            }
+        }
         (Claim::Detected(Some(rate)), _)
             if !spec.falsifies_data()
                 && spec.others.is_empty()

@@ -51,6 +51,7 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, vio
         Command::Check { how, .. } => matches!(how, Measuring::AsSent { .. } | Measuring::Sync { .. }),
         Command::Assign { .. }
         | Command::Map { .. }
+        | Command::Configure { .. }
         | Command::LssInquire { .. }
         | Command::LssActivate { .. }
         | Command::LssStore { .. } => true,
@@ -87,6 +88,7 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, vio
                         | Command::NmtState { .. }
                         | Command::NmtProbe { .. }
                         | Command::Map { .. }
+                        | Command::Configure { .. }
                         | Command::Store { .. }
                         | Command::Restore { .. }
                         // The state of a silent node.

@@ -37,7 +37,9 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violat
         && spec.device_faults().all(|device_fault| matches!(device_fault, DeviceFault::Refuse { .. }));
     let keeps = match &spec.command {
         Command::Log { .. } | Command::Check { .. } => true,
-        Command::Map { .. } | Command::Store { .. } | Command::Restore { .. } => clean_answers,
+        Command::Map { .. } | Command::Configure { .. } | Command::Store { .. } | Command::Restore { .. } => {
+            clean_answers
+        }
         _ => false,
     };
     if keeps && clean_answers {

@@ -59,7 +59,7 @@ fn object(random: &mut Random, devices: &[DeviceSpec], node: u8, write: bool) ->
 
 pub(super) fn command(random: &mut Random, devices: &[DeviceSpec]) -> Command {
     let one = node(random, devices);
-    match random.within(0..=45) {
+    match random.within(0..=47) {
         0 if random.percent(20) => Command::Scan { nodes: (1..=127).collect() },
         0 | 1 => Command::Scan { nodes: nodes(random, devices) },
         2 | 3 => Command::Read { nodes: nodes(random, devices) },
@@ -165,6 +165,12 @@ pub(super) fn command(random: &mut Random, devices: &[DeviceSpec]) -> Command {
         39 | 40 => Command::PdoWatch { nodes: nodes(random, devices), for_ms: *random.pick(&[50, 300, 1_000]) },
         41 if random.percent(30) => Command::Detect { ask: random.percent(50), each_ms: *random.pick(&[20, 150, 600]) },
         41..=43 => check(random, devices),
+        44 | 45 => Command::Configure {
+            node: one,
+            heartbeat_ms: *random.pick(&[0, 100, 500]),
+            timer_ms: random.percent(70).then(|| *random.pick(&[10, 100, 1000])),
+            digits: random.percent(30).then(|| random.byte(0..=3)),
+        },
         _ => {
             let how = random.within(0..=4);
             Command::Log {
