@@ -95,6 +95,8 @@ fn each_fault_has_its_finding() {
     let sending = Case::sending;
     let offline = "[[device]]\nkind = \"mh4\"\nnode = 5\noffline_after = [\"reset\"]\nset = { \"0x1017\" = 100 }\n";
     let silent = "\"0x1801:1\" = 0xC0000285";
+    let twin = |serial: u32| format!("[[device]]\nkind = \"mh4\"\nnode = 5\nduplicate_id = true\nserial = {serial}\n");
+    let other_channel: Vec<(u64, &str)> = (0..400).map(|at| (at * 10, "5C5#4300100094018200")).collect();
     let cases: Vec<(&str, Case, &[&str])> = vec![
         ("no device", Case::of(""), &["no-frame"]),
         ("no device, node named", Case::of("").node(5), &["no-frame"]),
@@ -142,6 +144,8 @@ fn each_fault_has_its_finding() {
             ),
             &["bus-errors", "5 pressure shared-cob-id", "6 pressure shared-cob-id"],
         ),
+        ("two devices with one node-ID", Case::of(&(twin(11) + &twin(22))), &["5 unexpected"]),
+        ("answers on another channel", Case::of("").hears(&other_channel).node(5), &["5 no-answer"]),
         (
             "wrong length",
             sending(&format!("\"0x1800:5\" = 0, \"0x1800:2\" = 1, {silent}")).hears(&[(1000, "185#0102")]),
