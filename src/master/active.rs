@@ -184,10 +184,11 @@ impl Active {
         outgoing: &mut Outgoing,
     ) -> bool {
         let has_begun = self.machine.has_begun();
-        let is_rejected = error == TransferError::Aborted(AbortCode::COMMAND_SPECIFIER);
+        let is_rejected = error == TransferError::Aborted(AbortCode::COMMAND_SPECIFIER) || begins_blocks(error);
         let is_read = self.request.operation() == Operation::Read;
         if !has_begun && is_rejected && is_read && self.request.may_restart() && !self.was_rejected {
-            // A server with an interrupted transfer rejects the first request, and accepts the next one.
+            // A server with an interrupted transfer rejects the first request, and accepts the next one. The same holds
+            // if it received another request than this one, and its transfer was aborted.
             self.was_rejected = true;
         } else if has_begun && is_of_transmission(error) && self.restarts_left > 0 {
             self.restarts_left -= 1;
@@ -269,6 +270,13 @@ impl Active {
             self.ambiguous |= same && command >> 5 == 1 && self.request.operation() == Operation::Write;
         }
     }
+}
+
+/// Whether the server has started a block transfer that was not requested, because a bit of the request was changed. It
+/// would treat the next requests as part of this transfer.
+pub(super) fn begins_blocks(error: TransferError) -> bool {
+    let TransferError::Violation(Violation::Command, frame) = error else { return false };
+    frame.data().first().is_some_and(|command| matches!(command & 0xe1, 0xa0 | 0xc0))
 }
 
 /// Whether a lost or changed frame can cause this failure in the middle of a transfer.

@@ -6,6 +6,7 @@ use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::sdo::DownloadSize;
 use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog;
 use cangauge::master::{Master, Request, SdoFailure, Timing};
@@ -60,6 +61,72 @@ fn read_is_repeated_once_if_the_server_was_in_another_transfer() {
         let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries });
         let read = master.read(node(), ObjectId::new(0x1000, 0), DataType::Unsigned(4)).expect("the bus works");
         assert_eq!(read.ok().as_ref().and_then(Value::as_u64), value, "{rejections} rejections");
+    }
+}
+
+/// A server that starts a block transfer after its first request, as if a bit of the request was flipped. It then ignores
+/// all requests until an abort.
+#[derive(Default)]
+struct Misread {
+    answer: u8,
+    is_in_blocks: Option<bool>,
+    written: Option<u8>,
+}
+
+impl Station for Misread {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        let [command, a, b, c, value, ..] = *frame.data() else { return };
+        let answer = match (self.is_in_blocks, command) {
+            (None, _) => {
+                self.is_in_blocks = Some(true);
+                format!("{:02X}{a:02X}{b:02X}{c:02X}0A000000", self.answer)
+            }
+            (Some(true), 0x80) => {
+                self.is_in_blocks = Some(false);
+                return;
+            }
+            (Some(false), 0x40) => format!("43{a:02X}{b:02X}{c:02X}07000000"),
+            (Some(false), _) => {
+                self.written = Some(value);
+                format!("60{a:02X}{b:02X}{c:02X}00000000")
+            }
+            (Some(true), _) => return,
+        };
+        out.send(format!("585#{answer}").parse().expect("a frame"));
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn block_transfer_that_was_not_requested_is_aborted() {
+    let (object, number) = (ObjectId::new(0x1000, 0), DataType::Unsigned(4));
+    for answer in [0xa0, 0xa4, 0xc0, 0xc6] {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Misread { answer, ..Misread::default() });
+        let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 1 });
+        let read = master.read(node(), object, number).expect("the bus works");
+        assert_eq!(read.ok().as_ref().and_then(Value::as_u64), Some(7), "{answer:02X}");
+        // A write is not repeated, because its answer does not show whether it had an effect. The next one arrives.
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Misread { answer, ..Misread::default() });
+        let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 1 });
+        let write = |master: &mut Master<'_>, value| {
+            let request = Request::write(node(), ObjectId::new(0x1017, 0), vec![value, 0], DownloadSize::Indicated);
+            master.transfer_one(request).expect("the bus works").is_ok()
+        };
+        assert!(!write(&mut master, 1), "{answer:02X}");
+        assert!(write(&mut master, 2), "{answer:02X}");
+        drop(master);
+        assert_eq!(bus.stations::<Misread>().next().expect("the server").written, Some(2));
     }
 }
 

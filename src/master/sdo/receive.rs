@@ -1,14 +1,14 @@
 //! Handles a received frame in the transfer of its node.
 
 use super::super::Timing;
-use super::super::active::LengthCheck;
+use super::super::active::{LengthCheck, begins_blocks};
 use super::super::request::{Answer, Operation, SdoError, SdoFailure};
 use super::super::send::Outgoing;
 use super::super::transfer::Blocks;
 use super::{Active, Finished, Node};
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
-use crate::canopen::sdo::{Progress, TransferError, Uploaded};
+use crate::canopen::sdo::{AbortCode, Progress, TransferError, Uploaded, abort_frame};
 use std::time::Duration;
 
 /// The inaccuracy when a send time is compared with a receive time.
@@ -202,6 +202,9 @@ impl Active {
             // An abort would end the foreign transfer.
             out.clear();
             return Step::Ended(Err(self.error(self.disturbance())));
+        }
+        if begins_blocks(error) && out.is_empty() {
+            out.push(abort_frame(self.request.node, self.request.object, AbortCode::TIMEOUT));
         }
         if self.lacks_block_transfer(error) {
             self.request.fall_back();
