@@ -329,20 +329,24 @@ fn silent_status_object_is_an_unknown_status() {
     assert_eq!(readings("mh4", &[0x6130]).expect_err("the value does not answer").kind(), Kind::NoAnswer);
 }
 
+fn polling() -> LogOptions {
+    LogOptions {
+        nodes: vec![node()],
+        wanted: Vec::new(),
+        mode: Mode::Poll(Duration::from_millis(100)),
+        duration: Some(Duration::from_secs(10)),
+        count: None,
+        nmt: true,
+        start_all: false,
+        max_gap: None,
+        overrides: Overrides::new(),
+    }
+}
+
 #[test]
 fn silent_status_object_does_not_slow_polling_down() {
     for (kind, silent, signals) in [("mh4", &[0x6150][..], 2), ("dps", &[0x1001], 1)] {
-        let options = LogOptions {
-            nodes: vec![node()],
-            wanted: Vec::new(),
-            mode: Mode::Poll(Duration::from_millis(100)),
-            duration: Some(Duration::from_secs(10)),
-            count: None,
-            nmt: true,
-            start_all: false,
-            max_gap: None,
-            overrides: Overrides::new(),
-        };
+        let options = polling();
         let mut kept = Kept::default();
         with_mute(kind, silent, |master| log(master, &options, &mut kept)).expect("the values answer");
         assert!(kept.rows.len() > 75 * signals, "{kind}: {}", kept.rows.len());
@@ -375,7 +379,42 @@ fn pages_show_the_objects_that_answer() {
         let device = settings::open(master, node(), &Overrides::new()).expect("answers");
         let failure = settings::errors::read(master, &device).expect_err("neither answers");
         assert_eq!(failure.kind(), Kind::NoAnswer);
+        let info = settings::info::read(master, &device).expect("the other objects answer");
+        assert!(info.errors.is_none() && !info.channels.is_empty());
     });
+}
+
+/// A second device with the node-ID: from this moment it answers reads of the pressure with another value.
+struct Joins(Mono);
+
+impl Station for Joins {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        if now >= self.0 && frame.data().starts_with(&[0x40, 0x30, 0x61, 1]) {
+            out.send("585#433061010000F040".parse().expect("a frame"));
+        }
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn second_device_that_joins_ends_polling() {
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
+    bus.attach(Mute::new("mh4", &[]));
+    bus.attach(Joins(Mono::START + Duration::from_secs(2)));
+    let options = LogOptions { duration: None, ..polling() };
+    let mut kept = Kept::default();
+    let report = log(&mut Master::new(&mut bus, Timing::default()), &options, &mut kept).expect("rows");
+    assert_eq!(report.two_devices.iter().map(Failure::kind).collect::<Vec<_>>(), [Kind::Unexpected]);
+    assert!(kept.rows.iter().all(|row| !row.contains("7.5")), "{:?}", kept.rows);
 }
 
 #[test]

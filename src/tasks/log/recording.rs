@@ -18,7 +18,7 @@ use crate::bus::{Bus, Filters, Mono, ReceiveBuffer, Received, TimestampSource};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::Transmission;
-use crate::master::{Answer, Error, Master, SdoError, Ticket};
+use crate::master::{Answer, Error, Master, SdoError, SdoFailure, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::layout::Tpdo;
 use crate::measure::sample::{Doubt, Sample};
@@ -321,7 +321,10 @@ impl<'o> Recording<'o> {
         self.samples.clear();
         let cycle = poll.cycle_of(ticket);
         if let Some(error) = poll.answer(ticket, result, &self.decoder, &mut self.samples) {
-            observer.event(&LogEvent::Remark(Remark::PollFailed(error)), master.bus().now());
+            observer.event(&LogEvent::Remark(Remark::PollFailed(error.clone())), master.bus().now());
+            if matches!(error.failure, SdoFailure::TwoDevices(Some(_))) {
+                return Ok(self.exclude(error.node, error.into()));
+            }
         }
         Ok(self.take_samples(cycle, observer))
     }

@@ -14,9 +14,9 @@ use crate::measure::sample::Sample;
 use crate::node::Node;
 use crate::node::read::Reader;
 use crate::node::state;
-use crate::tasks::Failure;
 use crate::tasks::failure::Cause;
 use crate::tasks::read::{objects, sample, targets};
+use crate::tasks::{Failure, Kind};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -199,6 +199,8 @@ pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Info, Failure> {
     let errors = match read_errors(master, node) {
         Ok(errors) => Some(errors),
         Err(Failure { cause: Cause::Settings(SettingsFailure::NoErrorObjects), .. }) => None,
+        // Other objects answered before. A note names the silent ones.
+        Err(failure) if failure.kind() == Kind::NoAnswer => None,
         Err(failure) => return Err(failure),
     };
     let state = state(master, node, &values)?;

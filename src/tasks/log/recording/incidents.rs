@@ -265,7 +265,7 @@ impl Recording<'_> {
             return ControlFlow::Continue(());
         }
         self.remark(Remark::TwoSenders(node, number), at, observer);
-        self.exclude(Failure::at(node, LogFailure::TwoSenders(number)), node)
+        self.exclude(node, Failure::at(node, LogFailure::TwoSenders(number)))
     }
 
     /// Handles two answers to one request of another master. If their difference makes the setup uncertain, the TPDOs of
@@ -283,11 +283,11 @@ impl Recording<'_> {
             return ControlFlow::Continue(());
         }
         let failure = SdoFailure::TwoDevices(Some(answers));
-        self.exclude(SdoError { node, object, operation: Operation::Read, failure }.into(), node)
+        self.exclude(node, SdoError { node, object, operation: Operation::Read, failure }.into())
     }
 
-    /// Ignores the TPDOs of a node from now on. Without another node, the recording ends.
-    fn exclude(&mut self, failure: Failure, node: NodeId) -> ControlFlow<()> {
+    /// Ignores the values of a node from now on. Without another node, the recording ends.
+    pub(super) fn exclude(&mut self, node: NodeId, failure: Failure) -> ControlFlow<()> {
         self.two_devices.entry(node).or_insert(failure);
         let sources = self.decoder.sources();
         self.early.retain(|samples| samples.iter().all(|sample| sources[sample.source].node != node));
@@ -296,6 +296,7 @@ impl Recording<'_> {
             Some(listener) => listener.exclude(node, &mut self.decoder),
             None => {
                 self.decoder.pause(node);
+                self.poll.iter_mut().for_each(|poll| poll.pause(node));
                 self.liveness.nodes().next().is_some()
             }
         };
