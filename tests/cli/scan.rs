@@ -86,8 +86,8 @@ fn no_node_is_exit_3() {
     bench.run("scan 6-9").fails(
         3,
         "cangauge: no node answered\n\
-         hint: check the power of the sensor, the bit rate, the wiring and the 120 ohm terminators; \
-         without hardware: --bus sim\n",
+         hint: check the power, the bit rate, the wiring and the 120 ohm terminators; stopped nodes do not answer: \
+         cangauge nmt preop all; without hardware: --bus sim\n",
     );
     let error = bench.run("scan 6-9 --format json").exit(3).error();
     assert_eq!((&error["error"]["kind"], &error["error"]["exit"]), (&json!("no-answer"), &json!(3)));

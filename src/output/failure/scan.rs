@@ -8,8 +8,8 @@ use crate::tasks::scan::ScanFailure;
 pub(super) fn words(_failure: &Failure, cause: &ScanFailure) -> Words {
     match cause {
         ScanFailure::NoAnswer => Words::new("no node answered").hint(
-            "check the power of the sensor, the bit rate, the wiring and the 120 ohm terminators; without hardware: \
-             --bus sim",
+            "check the power, the bit rate, the wiring and the 120 ohm terminators; stopped nodes do not answer: \
+             cangauge nmt preop all; without hardware: --bus sim",
         ),
         ScanFailure::NoFrame => Words::new("no node sent anything")
             .hint("a node without heartbeat and TPDOs sends nothing; ask the nodes: cangauge doctor"),
