@@ -2,7 +2,6 @@
 
 mod apply;
 mod diff;
-mod journal;
 mod table;
 
 use super::args::Nodes;

@@ -1,31 +1,40 @@
-//! The journal of temporary writes: one small file per bus and device in `$XDG_STATE_HOME/cangauge/`.
+//! The journal: what must be undone if the program is killed, one file per bus and device in
+//! `$XDG_STATE_HOME/cangauge/`. It contains a temporary write, or the settings before `config apply`.
 //!
-//! The file is written and synced before the write, locked while its program runs, and removed when the write is
-//! undone. A file without a lock comes from a program that was killed.
+//! The file is written and synced before the first write to the device, and removed after success. The file of a
+//! temporary write is locked while its program runs. Without a lock it comes from a program that was killed.
 
 use super::args::BusSpec;
 use crate::bus::file::lock;
 use crate::canopen::id::NodeId;
+use crate::output::config::write_toml;
+use crate::output::console::Console;
+use crate::tasks::Failure;
+use crate::tasks::config::{self, ConfigFailure, Snapshot};
 use crate::tasks::journal::{Journal, JournalError, TemporaryWrite};
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// The first line of each file. Another version is ignored.
+/// The first line of the file of a temporary write. Another version is ignored.
 const HEAD: &str = "cangauge journal 1";
+
+/// The extensions of the two kinds of files.
+const WRITE: &str = "undo";
+const SETTINGS: &str = "toml";
 
 /// The files of one bus.
 #[derive(Debug)]
 pub(super) struct FileJournal {
     folder: Option<PathBuf>,
     bus: String,
-    /// The files of this run, locked.
+    /// The temporary writes of this run, locked.
     own: BTreeMap<PathBuf, File>,
 }
 
 impl FileJournal {
-    /// The journal of a bus. Simulated devices and recordings need no journal.
+    /// The temporary writes on a bus. Simulated devices and recordings need no journal.
     pub(super) fn of(bus: &BusSpec) -> FileJournal {
         match bus {
             BusSpec::SocketCan(name) => FileJournal::in_folder(folder(), name),
@@ -38,13 +47,19 @@ impl FileJournal {
         FileJournal { folder, bus: bus.to_owned(), own: BTreeMap::new() }
     }
 
-    fn path(&self, write: &TemporaryWrite) -> Option<PathBuf> {
-        let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
-        let bus: String = self.bus.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect();
-        let [vendor, product, _, serial] =
-            write.identity.map(|number| number.map_or("x".to_owned(), |n| n.to_string()));
-        let name = format!("{bus}-{vendor}-{product}-{serial}-{}-{:04x}.undo", write.node, write.object.index);
-        Some(self.folder.as_ref()?.join(name))
+    /// The file of a device. A device without a serial number is known by its node-ID.
+    fn path(&self, node: NodeId, identity: [Option<u32>; 4], more: &str) -> Option<PathBuf> {
+        let bus: String = self.bus.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+        let [vendor, product, _, serial] = identity;
+        let code = |number: Option<u32>| number.map_or_else(|| "-".to_owned(), |number| format!("{number:X}"));
+        let device =
+            serial.filter(|serial| *serial != 0).map_or_else(|| format!("node{node}"), |serial| serial.to_string());
+        Some(self.folder.as_ref()?.join(format!("{bus}_{}_{}_{device}{more}", code(vendor), code(product))))
+    }
+
+    fn path_of(&self, write: &TemporaryWrite) -> Option<PathBuf> {
+        let more = format!("_{}_{:04x}.{WRITE}", write.node, write.object.index);
+        self.path(write.node, write.identity, &more)
     }
 
     /// The writes of killed programs on this bus, for these nodes.
@@ -52,37 +67,87 @@ impl FileJournal {
         let entries = self.folder.as_ref().and_then(|folder| fs::read_dir(folder).ok());
         let paths: Vec<PathBuf> = entries.into_iter().flatten().flatten().map(|entry| entry.path()).collect();
         let mut found = Vec::new();
-        for path in paths.into_iter().filter(|path| path.extension().is_some_and(|extension| extension == "undo")) {
+        for path in paths.into_iter().filter(|path| path.extension().is_some_and(|extension| extension == WRITE)) {
             let Ok(text) = fs::read_to_string(&path) else { continue };
             let Some(write) = parse(&text, &self.bus).filter(|write| is_ours(write.node)) else { continue };
             let Ok(file) = File::options().append(true).open(&path) else { continue };
-            if self.path(&write).as_ref() == Some(&path) && lock(&file).is_ok() {
+            if self.path_of(&write).as_ref() == Some(&path) && lock(&file).is_ok() {
                 self.own.insert(path, file);
                 found.push(write);
             }
         }
         found
     }
-
-    fn create(&mut self, path: &Path, write: &TemporaryWrite) -> io::Result<()> {
-        let file = write_synced(path, File::options().append(true).create(true), text(write, &self.bus).as_bytes())?;
-        self.own.insert(path.to_owned(), file);
-        Ok(())
-    }
 }
 
 impl Journal for FileJournal {
     fn record(&mut self, write: &TemporaryWrite) -> Result<(), JournalError> {
-        let Some(path) = self.path(write) else { return Ok(()) };
-        let error = |error: io::Error| JournalError { file: path.display().to_string(), reason: error.to_string() };
-        self.create(&path, write).map_err(error)
+        let Some(path) = self.path_of(write) else { return Ok(()) };
+        let file = write_synced(&path, text(write, &self.bus).as_bytes())
+            .map_err(|error| JournalError { file: path.display().to_string(), reason: error.to_string() })?;
+        self.own.insert(path, file);
+        Ok(())
     }
 
     fn remove(&mut self, write: &TemporaryWrite) {
-        if let Some(path) = self.path(write) {
+        if let Some(path) = self.path_of(write) {
             // If the file remains, the next run finds that the object has changed since then.
             let _ = fs::remove_file(&path);
             self.own.remove(&path);
+        }
+    }
+}
+
+/// The settings of one device before `config apply`. They are kept if the change fails or the program is killed.
+pub(super) struct SettingsJournal<'a> {
+    node: NodeId,
+    path: Option<PathBuf>,
+    console: &'a Console,
+}
+
+impl<'a> SettingsJournal<'a> {
+    pub(super) fn new(bus: &str, snapshot: &Snapshot, console: &'a Console) -> SettingsJournal<'a> {
+        let node = &snapshot.node;
+        let path =
+            FileJournal::in_folder(folder(), bus).path(node.id, node.identity.numbers(), &format!(".{SETTINGS}"));
+        SettingsJournal { node: node.id, path, console }
+    }
+
+    /// The old settings after an incomplete change: the name of the file, and its text.
+    ///
+    /// # Errors
+    /// [`ConfigFailure::NoJournal`].
+    pub(super) fn latest(&self) -> Result<(String, String), Failure> {
+        let text = self.path.as_ref().and_then(|path| fs::read_to_string(path).ok());
+        let latest = self.path.as_ref().zip(text).map(|(path, text)| (path.display().to_string(), text));
+        latest.ok_or_else(|| Failure::at(self.node, ConfigFailure::NoJournal))
+    }
+}
+
+impl config::Journal for SettingsJournal<'_> {
+    fn begin(&mut self, before: &Snapshot) -> Result<(), Failure> {
+        let Some(path) = &self.path else {
+            self.console.note("no journal: neither XDG_STATE_HOME nor HOME is set; --rollback is not possible");
+            return Ok(());
+        };
+        // An earlier change was not completed, so the settings before that change are kept.
+        if path.exists() {
+            return Ok(());
+        }
+        let mut text = Vec::new();
+        // If the program is killed now, no incomplete journal remains.
+        let draft = path.with_extension("draft");
+        let written = write_toml(&before.dump(false), &mut text).and_then(|()| write_synced(&draft, &text));
+        written.and_then(|_| fs::rename(&draft, path)).map(|()| sync_folder(path)).map_err(|error| {
+            let reason = format!("{}: {error}", path.display());
+            Failure::at(self.node, ConfigFailure::Journal { reason })
+        })
+    }
+
+    fn finish(&mut self) {
+        if let Some(path) = &self.path {
+            // A remaining file is older than the settings. --rollback then reports it, because the values differ.
+            let _ = fs::remove_file(path);
         }
     }
 }
@@ -92,10 +157,9 @@ impl Journal for FileJournal {
 ///
 /// # Errors
 /// The file cannot be written, or another process has locked it.
-pub(super) fn write_synced(path: &Path, options: &OpenOptions, text: &[u8]) -> io::Result<File> {
-    let folder = path.parent().unwrap_or(path);
-    fs::create_dir_all(folder)?;
-    let mut file = options.open(path)?;
+fn write_synced(path: &Path, text: &[u8]) -> io::Result<File> {
+    fs::create_dir_all(path.parent().unwrap_or(path))?;
+    let mut file = File::options().append(true).create(true).open(path)?;
     lock(&file).map_err(|_| io::Error::from(io::ErrorKind::ResourceBusy))?;
     file.set_len(0)?;
     file.write_all(text)?;
@@ -104,8 +168,8 @@ pub(super) fn write_synced(path: &Path, options: &OpenOptions, text: &[u8]) -> i
     Ok(file)
 }
 
-/// Syncs a folder, so that the name of a file survives a power failure.
-pub(super) fn sync_folder(path: &Path) {
+/// Syncs the folder of a file, so that the name of the file survives a power failure.
+fn sync_folder(path: &Path) {
     if let Ok(folder) = File::open(path.parent().unwrap_or(path)) {
         // Some file systems cannot sync a folder.
         let _ = folder.sync_all();
@@ -113,7 +177,7 @@ pub(super) fn sync_folder(path: &Path) {
 }
 
 /// The folder for the state of programs (XDG base directories). `None` if the environment contains none.
-pub(super) fn folder() -> Option<PathBuf> {
+fn folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;
     Some(state.join("cangauge"))

@@ -2,6 +2,7 @@
 
 use super::args::{Duration, Nodes};
 use super::exit::{several, stdout};
+use super::journal::FileJournal;
 use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -196,7 +197,8 @@ impl MapArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let request = self.request()?;
         let overrides = descriptions::overrides(global, &[self.node])?;
-        let mapped = global.with_master(|master| Ok(map(master, &request, self.store, &overrides)?))?;
+        let mut journal = FileJournal::of(&open::spec(global)?);
+        let mapped = global.with_master(|master| Ok(map(master, &request, self.store, &overrides, &mut journal)?))?;
         let console = global.console();
         match mapped.writes {
             0 => {}

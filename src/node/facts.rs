@@ -33,6 +33,11 @@ impl Identity {
         self.device_type.map(|device_type| device_type & 0xffff)
     }
 
+    /// 1018h:1 to 4, as far as they are known.
+    pub fn numbers(&self) -> [Option<u32>; 4] {
+        [self.vendor, self.product, self.revision, self.serial]
+    }
+
     /// Whether a description or EDS can be for this device: vendor and product agree. Unknown numbers are not compared.
     pub fn fits(&self, model: &Model) -> bool {
         model.made_for.iter().all(|device| device.fits(self.vendor, self.product))

@@ -8,7 +8,7 @@ use crate::canopen::value::DataType;
 use crate::master::{Error as MasterError, Master, Request};
 use crate::node::read::read_values;
 use crate::node::write::write;
-use crate::node::{Error, Identity, Node};
+use crate::node::{Error, Node};
 
 /// A temporary write of an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -81,8 +81,7 @@ impl Undone {
 impl TemporaryWrite {
     /// The record of a write to this node.
     pub fn to(node: &Node, object: ObjectId, before: &[u8], written: &[u8]) -> TemporaryWrite {
-        let Identity { vendor, product, revision, serial, .. } = node.identity;
-        let identity = [vendor, product, revision, serial];
+        let identity = node.identity.numbers();
         TemporaryWrite { node: node.id, identity, object, before: before.to_vec(), written: written.to_vec() }
     }
 

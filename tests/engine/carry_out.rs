@@ -284,7 +284,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
                 inhibit_100us: None,
                 cob_id: *cob_id,
             };
-            Claim::Mapped(pdo::map(master, &request, *keep, &none)?.shown.settings)
+            Claim::Mapped(pdo::map(master, &request, *keep, &none, &mut NoJournal)?.shown.settings)
         }
         Command::Configure { node: id, heartbeat_ms, timer_ms, digits } => {
             let mut text = format!("[node]\nheartbeat = \"{heartbeat_ms}ms\"\n");

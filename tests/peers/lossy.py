@@ -150,7 +150,7 @@ class Worker(threading.Thread):
 
     def left(self):
         """The journals of this node."""
-        names = (f"-{self.node}-", f"_node{self.node}.", f"_{1000 + self.node}.")
+        names = [f"_{key}{end}" for key in (f"node{self.node}", 1000 + self.node) for end in "._"]
         return [path for path in glob.glob(f"{self.test.state}/*/*") if any(name in path for name in names)]
 
 

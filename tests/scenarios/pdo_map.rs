@@ -13,6 +13,7 @@ use cangauge::master::{Master, Timing};
 use cangauge::output::failure::ErrorMessage;
 use cangauge::output::notes::note;
 use cangauge::sim::{Device, Setup, State};
+use cangauge::tasks::journal::NoJournal;
 use cangauge::tasks::pdo::{Item, MapReport, PdoRequest, Trigger, map};
 use cangauge::tasks::{Failure, Kind};
 use std::collections::VecDeque;
@@ -255,7 +256,7 @@ impl Case {
     fn run(&self, start: bool, fault: Fault, at: usize) -> Outcome {
         let mut faulty = FaultyBus::new(self.bus(start), fault, at);
         let mut master = Master::new(&mut faulty, Timing::default());
-        let result = map(&mut master, &self.request(), false, &Default::default());
+        let result = map(&mut master, &self.request(), false, &Default::default(), &mut NoJournal);
         master.settle();
         let took = faulty.bus.now().mono.since_start();
         // Deliver the frames that are still on the wire.
@@ -469,8 +470,20 @@ fn the_right_steps_in_the_right_order() {
     // What is set already is not written.
     let bus = |case: &Case| {
         let mut bus = case.bus(false);
-        let first = map(&mut Master::new(&mut bus, Timing::default()), &case.request(), false, &Default::default());
-        let again = map(&mut Master::new(&mut bus, Timing::default()), &case.request(), false, &Default::default());
+        let first = map(
+            &mut Master::new(&mut bus, Timing::default()),
+            &case.request(),
+            false,
+            &Default::default(),
+            &mut NoJournal,
+        );
+        let again = map(
+            &mut Master::new(&mut bus, Timing::default()),
+            &case.request(),
+            false,
+            &Default::default(),
+            &mut NoJournal,
+        );
         (first.unwrap().writes, again.unwrap().writes)
     };
     for (case, writes) in CASES.iter().zip([9, 5, 8, 8, 2, 4]) {

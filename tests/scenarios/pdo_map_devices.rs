@@ -1,8 +1,11 @@
 //! `pdo map` on devices that differ from the four simulated ones: bit 31 is rejected, the mapping is fixed, there is an
 //! inhibit time, a TPDO has no identifier, the width of an object is unknown.
 
+use super::pdo_map::{Fault, FaultyBus};
+use super::probe::Kept;
 use cangauge::bus::memory::{Clock, MemoryBus};
-use cangauge::canopen::id::NodeId;
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::pdo::TpdoNumber;
 use cangauge::device::catalog::Model;
@@ -10,6 +13,7 @@ use cangauge::master::{Master, Timing};
 use cangauge::output::failure::ErrorMessage;
 use cangauge::output::notes::note;
 use cangauge::sim::{Device, Setup, State};
+use cangauge::tasks::journal::{NoJournal, Undone};
 use cangauge::tasks::pdo::{Item, MapReport, PdoRequest, Trigger, map};
 use cangauge::tasks::{Failure, Kind};
 use std::collections::BTreeMap;
@@ -95,7 +99,7 @@ impl Bench {
     fn map(&mut self, request: &PdoRequest, described: bool) -> Result<MapReport, Failure> {
         let given = described.then(|| (node(), Arc::clone(&self.model)));
         let overrides: BTreeMap<_, _> = given.into_iter().collect();
-        map(&mut Master::new(&mut self.bus, Timing::default()), request, false, &overrides)
+        map(&mut Master::new(&mut self.bus, Timing::default()), request, false, &overrides, &mut NoJournal)
     }
 
     fn number(&mut self, object: &str) -> u32 {
@@ -166,6 +170,33 @@ fn inhibit_time_is_written_while_the_pdo_is_off() {
     assert_eq!(bench.map(&inhibited, false).unwrap().writes, 3);
     assert_eq!((bench.number("1800:3"), bench.number("1800:1")), (25, 0x189));
     assert_eq!(bench.map(&inhibited, false).unwrap().writes, 0);
+}
+
+/// The program is killed at each write of `pdo map --inhibit`. The next command switches the TPDO on again.
+#[test]
+fn killed_change_of_the_inhibit_time_leaves_the_pdo_on() {
+    let new = || Bench::new(description("", &parameters("default = \"$NODEID+0x180\"")));
+    let inhibited = PdoRequest { inhibit_100us: Some(25), ..request(&[]) };
+    let is_write = |frame: &&Frame| frame.id() == CanId::sdo_request(node()) && frame.data()[0] >> 5 == 1;
+    let run = |bus: &mut FaultyBus, journal: &mut Kept| {
+        map(&mut Master::new(bus, Timing::default()), &inhibited, false, &BTreeMap::new(), journal)
+    };
+    let mut clean = FaultyBus::new(new().bus, Fault::None, 0);
+    let mut kept = Kept::default();
+    assert_eq!((run(&mut clean, &mut kept).unwrap().writes, kept.0.len()), (3, 0));
+    let writes = clean.sent.iter().enumerate().filter(|(_, frame)| is_write(frame)).map(|(at, _)| at);
+    for (at, undone) in writes.zip([Undone::ChangedSince, Undone::Restored, Undone::Restored]) {
+        let mut bench = new();
+        let mut killed = FaultyBus::new(bench.bus, Fault::Gone, at);
+        let mut kept = Kept::default();
+        run(&mut killed, &mut kept).expect_err("the device does not answer");
+        bench.bus = killed.bus;
+        let [write] = &kept.0[..] else { panic!("{} records", kept.0.len()) };
+        assert_eq!(write.undo(&mut Master::new(&mut bench.bus, Timing::default())).unwrap(), undone, "at {at}");
+        assert_eq!(bench.number("1800:1"), 0x189, "at {at}");
+        bench.map(&inhibited, false).unwrap();
+        assert_eq!((bench.number("1800:3"), bench.number("1800:1")), (25, 0x189));
+    }
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn ctrl_c_at_any_time_restores_the_heartbeat() {
 
 /// A journal that outlives its program, with the number of frames that were sent before each record.
 #[derive(Default)]
-struct Kept(Vec<TemporaryWrite>);
+pub(super) struct Kept(pub(super) Vec<TemporaryWrite>);
 
 impl Journal for Kept {
     fn record(&mut self, write: &TemporaryWrite) -> Result<(), JournalError> {

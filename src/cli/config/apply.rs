@@ -2,7 +2,6 @@
 
 mod prompt;
 
-use super::journal::{FileJournal, latest};
 use super::table::Table;
 use super::{Failures, described, file, mistakes, nodes_and_file, parse};
 use crate::bus::Wall;
@@ -11,6 +10,7 @@ use crate::canopen::id::NodeId;
 use crate::cli::args::Nodes;
 use crate::cli::exit::{IntoFailure, several_each};
 use crate::cli::file::ReportFile;
+use crate::cli::journal::SettingsJournal;
 use crate::cli::{Global, descriptions, open};
 use crate::device::config_file::Document;
 use crate::master::Master;
@@ -280,8 +280,8 @@ impl Apply {
         let node = job.node;
         master.listen_to(&[node]).map_err(|error| one(error.into()))?;
         let snapshot = read(master, node, overrides, job.file.as_ref()).map_err(one)?;
-        let mut journal = FileJournal::new(master.bus().name(), &snapshot, console);
-        let interrupted = latest(master.bus().name(), &snapshot).and_then(|(file, text)| {
+        let mut journal = SettingsJournal::new(master.bus().name(), &snapshot, console);
+        let interrupted = journal.latest().and_then(|(file, text)| {
             let unreadable = || Failure::at(node, ConfigFailure::Journal { reason: file.clone() });
             let document = parse(&file, &text).map_err(|_| unreadable())?;
             Ok((file, document))
@@ -363,12 +363,4 @@ fn ends_all(failure: &Failure) -> bool {
 fn ended(master: &mut Master<'_>) -> (String, Wall) {
     let bus = master.bus();
     (bus.name().to_owned(), bus.now().wall)
-}
-
-/// The text of a snapshot, for the journal.
-pub(super) fn text_of(snapshot: &Snapshot) -> Vec<u8> {
-    let mut text = Vec::new();
-    // Writing to memory does not fail.
-    let _ = crate::output::config::write_toml(&snapshot.dump(false), &mut text);
-    text
 }

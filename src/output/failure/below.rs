@@ -11,6 +11,7 @@ use crate::canopen::sdo::Violation;
 use crate::tasks::failure::{
     BusError, ExpressionError, LssError, MissedAnswer, Operation, SdoError, SdoFailure, SecondAnswer,
 };
+use crate::tasks::journal::JournalError;
 use std::path::Path;
 use std::time::Duration;
 
@@ -147,6 +148,11 @@ pub fn second_answer(node: NodeId, answers: SecondAnswer) -> String {
         return format!("node {node}: {}", SdoFailure::TwoDevices(Some(answers)));
     }
     format!("node {node}: answers arrive twice: two devices have node-ID {node}, or a bridge repeats frames")
+}
+
+/// A temporary write could not be recorded.
+pub(super) fn not_recorded(error: &JournalError) -> String {
+    format!("write the journal {}: {}", error.file, error.reason)
 }
 
 /// Optional objects of a node have no valid answer.

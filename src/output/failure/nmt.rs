@@ -18,10 +18,8 @@ pub(super) fn words(failure: &Failure, cause: &NmtFailure) -> Words {
             .hint(format!("set a heartbeat: cangauge sdo write {node} producer-heartbeat-time 1000")),
         NmtFailure::Absent => Words::new("no heartbeat and no SDO answer")
             .hint(failure.node.map_or_else(|| below::check_node(None), below::check_silent_node)),
-        NmtFailure::NotRecorded(error) => {
-            Words::new(format!("write the journal {}: {}; nothing was changed", error.file, error.reason))
-                .hint("choose a writable folder: XDG_STATE_HOME=/tmp/state cangauge …")
-        }
+        NmtFailure::NotRecorded(error) => Words::new(format!("{}; nothing was changed", below::not_recorded(error)))
+            .hint("choose a writable folder: XDG_STATE_HOME=/tmp/state cangauge …"),
         NmtFailure::NoStartupObject => Words::new("the object that decides how this device starts is unknown")
             .hint(format!("many devices have 1F80h; read it: cangauge sdo read {node} 0x1F80")),
     }

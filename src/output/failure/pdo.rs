@@ -1,6 +1,6 @@
 //! Text for causes, effects and notes: a TPDO could not be shown or changed, and reports about a change.
 
-use super::Words;
+use super::{Words, below};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::{MappingEntry, Transmission};
 use crate::output::diagnosis;
@@ -132,6 +132,7 @@ fn step(error: &StepError, write: Option<&StepWrite>) -> String {
         }
         StepError::Restarted => "it restarted during the change".to_owned(),
         StepError::Interrupted => at.map_or_else(|| "interrupted".to_owned(), |at| format!("interrupted at {at}")),
+        StepError::NotRecorded(error) => below::not_recorded(error),
         StepError::Bus(error) => at.map_or_else(|| error.to_string(), |at| format!("{error} at {at}")),
         StepError::NotKept { object, found, written } => {
             format!("the write of {object} was acknowledged, but its value is {found:#X} instead of {written:#X}")

@@ -9,6 +9,7 @@ use crate::canopen::pdo::MappingEntry;
 use crate::canopen::sdo::AbortCode;
 use crate::device::description::Remap;
 use crate::master::{SdoError, SdoFailure};
+use crate::tasks::journal::{Journal, TemporaryWrite};
 use crate::tasks::note::StateEffect;
 use crate::tasks::{Effect, Fact, Failure, Note};
 use std::time::Duration;
@@ -37,6 +38,9 @@ pub(super) struct Change<'m, 'bus> {
     /// The last write that was confirmed.
     pub(super) confirmed: Option<StepWrite>,
     pub(super) notes: Vec<Note>,
+    pub(super) journal: &'m mut dyn Journal,
+    /// The write that switched the PDO off, while it is in the journal.
+    pub(super) recorded: Option<TemporaryWrite>,
 }
 
 /// The settings of the TPDO after an attempt to restore them.
@@ -54,6 +58,7 @@ impl Change<'_, '_> {
         if let Err(error) = self.attempt() {
             self.undo(&error)?;
         }
+        self.remove_record();
         if let Some(state) = self.restore_state() {
             self.note(Fact::State(state));
         }
@@ -82,6 +87,9 @@ impl Change<'_, '_> {
         let off = writes.first().filter(|write| **write == self.off()).cloned();
         if let Some(off) = off {
             writes.remove(0);
+            if old.mapping == wanted.mapping {
+                self.record(&off)?;
+            }
             match self.step(&off) {
                 Err(StepError::Rejected(error)) if self.may_stay_on(&error) => {
                     self.note(PdoFact::ChangedWhileOn { number: old.number, error });
@@ -99,6 +107,20 @@ impl Change<'_, '_> {
             self.step(write)?;
         }
         self.read_back(&wanted)
+    }
+
+    /// Records that the PDO is switched off, so that it is switched on again if the program is killed. A PDO with an
+    /// incomplete mapping stays off.
+    fn record(&mut self, off: &StepWrite) -> Result<(), StepError> {
+        let before = self.old.cob_id.0.to_le_bytes();
+        let write = TemporaryWrite::to(self.session.node, off.object, &before, &off.bytes());
+        self.journal.record(&write).map_err(StepError::NotRecorded)?;
+        self.recorded = Some(write);
+        Ok(())
+    }
+
+    fn remove_record(&mut self) {
+        self.recorded.take().iter().for_each(|write| self.journal.remove(write));
     }
 
     /// The write that switches the PDO off.
@@ -159,6 +181,7 @@ impl Change<'_, '_> {
                     return Ok(());
                 }
                 Ok(Restored::Old) => {
+                    self.remove_record();
                     let (node, number) = (self.session.node.id, self.old.number);
                     let state = self.restore_state();
                     let failure = self.failure(error).with(node, PdoEffect::Restored { number });

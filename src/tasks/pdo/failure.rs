@@ -9,6 +9,7 @@ use crate::canopen::sdo::AbortCode;
 use crate::master::{Error, SdoError, SdoFailure};
 use crate::tasks::diagnosis::Silence;
 use crate::tasks::failure::Cause;
+use crate::tasks::journal::JournalError;
 use crate::tasks::store::Group;
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
@@ -171,6 +172,8 @@ pub enum StepError {
     Interrupted,
     /// The bus failed.
     Bus(Arc<BusError>),
+    /// The step could not be recorded in the journal, so it was not sent.
+    NotRecorded(JournalError),
     /// The device acknowledged a write, but has another value.
     NotKept {
         /// The object.
@@ -190,6 +193,7 @@ impl StepError {
             StepError::Lost(error) => Cause::Sdo(Box::new(error.clone())).kind(),
             StepError::Restarted | StepError::NotKept { .. } => Kind::Unexpected,
             StepError::Interrupted => Kind::Interrupted,
+            StepError::NotRecorded(_) => Kind::Io,
             StepError::Bus(error) => Cause::Bus(Arc::clone(error)).kind(),
         }
     }
@@ -199,7 +203,7 @@ impl StepError {
         match self {
             StepError::Rejected(error) | StepError::Lost(error) => Some(error.object),
             StepError::NotKept { object, .. } => Some(*object),
-            StepError::Restarted | StepError::Interrupted | StepError::Bus(_) => None,
+            StepError::Restarted | StepError::Interrupted | StepError::NotRecorded(_) | StepError::Bus(_) => None,
         }
     }
 
@@ -378,6 +382,9 @@ pub(super) fn not_read(node: NodeId, available: Vec<TpdoNumber>, error: StepErro
         StepError::Lost(error) => error.into(),
         StepError::Interrupted => Failure::general(Cause::Interrupted),
         StepError::Bus(error) => Failure::general(Cause::Bus(error)),
-        StepError::Restarted | StepError::NotKept { .. } => Failure::at(node, PdoFailure::Restarted),
+        // Only writes are recorded and read back.
+        StepError::Restarted | StepError::NotKept { .. } | StepError::NotRecorded(_) => {
+            Failure::at(node, PdoFailure::Restarted)
+        }
     }
 }

@@ -16,6 +16,7 @@ use crate::master::Master;
 use crate::measure::layout::Tpdo;
 use crate::node::survey::narrow_values;
 use crate::node::{Node, Overrides};
+use crate::tasks::journal::{Journal, NoJournal};
 use crate::tasks::settings::open;
 use crate::tasks::store::{self, Group};
 use crate::tasks::{Failure, Kind, Note};
@@ -34,7 +35,7 @@ pub struct MapReport {
 }
 
 /// Sets a TPDO as requested. With `store` the device then stores the settings. All checks are made before the first
-/// write.
+/// write. The journal records that the TPDO is off while its parameters change.
 ///
 /// # Errors
 /// If a step failed, the old settings are restored. If this also failed, the failure contains the last confirmed step
@@ -44,6 +45,7 @@ pub fn map(
     request: &PdoRequest,
     store: bool,
     overrides: &Overrides,
+    journal: &mut dyn Journal,
 ) -> Result<MapReport, Failure> {
     request.check()?;
     let (number, node) = (request.number, open(master, request.node, overrides)?);
@@ -68,7 +70,7 @@ pub fn map(
         let mut planned = Node { tpdos: vec![tpdo], ..node.clone() };
         notes.extend(Note::may_clip(node.id, narrow_values(session.master, &mut planned)?));
     }
-    let Changed { writes, wanted, notes: of_change } = change_settings(session, old, wanted)?;
+    let Changed { writes, wanted, notes: of_change } = change_settings(session, old, wanted, journal)?;
     let note = |fact: PdoFact| Note::of_node(node.id, fact);
     if writes == 0 {
         notes.insert(0, note(PdoFact::AlreadySet { number }));
@@ -115,7 +117,7 @@ pub(in crate::tasks) fn change(
     old: Settings,
     wanted: Settings,
 ) -> Result<Changed, Failure> {
-    change_settings(Session::new(master, node), old, wanted)
+    change_settings(Session::new(master, node), old, wanted, &mut NoJournal)
 }
 
 /// The writes of [`change`], if the device rejects none of them.
@@ -124,7 +126,12 @@ pub(in crate::tasks) fn steps(node: &Node, old: &Settings, wanted: &Settings) ->
     plan::writes(old, wanted, remap, false)
 }
 
-fn change_settings(mut session: Session<'_, '_>, old: Settings, wanted: Settings) -> Result<Changed, Failure> {
+fn change_settings<'m>(
+    mut session: Session<'m, '_>,
+    old: Settings,
+    wanted: Settings,
+    journal: &'m mut dyn Journal,
+) -> Result<Changed, Failure> {
     check(&mut session, &old, &wanted)?;
     let model = session.node.model.as_deref();
     let mut change = Change {
@@ -139,6 +146,8 @@ fn change_settings(mut session: Session<'_, '_>, old: Settings, wanted: Settings
         failed_at: None,
         confirmed: None,
         notes: Vec::new(),
+        journal,
+        recorded: None,
     };
     change.run()?;
     Ok(Changed { writes: change.session.writes, wanted: change.wanted, notes: change.notes })
