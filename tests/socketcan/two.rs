@@ -118,7 +118,7 @@ fn an_interface_is_one_claim_under_each_of_its_names() {
 #[ignore = "needs a CAN interface: tests/socketcan/run"]
 fn a_scan_needs_no_more_than_64_descriptors() {
     let can = Can::get();
-    let _devices = Devices::new(&can);
+    let _devices = Devices::new(&can.name, "mh4@5,dps@6");
     // Seven of the 64 descriptors are in use.
     let script = "ulimit -n 64; exec 5</dev/null 6</dev/null 7</dev/null 8</dev/null; exec \"$@\"";
     for line in ["scan", "-f json scan 1-127", "read all"] {
