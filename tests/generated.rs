@@ -69,7 +69,8 @@ fn escape(text: &str) -> String {
 }
 
 /// The page of a command. It differs from `Man::render`: the synopsis is short, the text after the options keeps its
-/// lines and has a heading for each paragraph, hand-written sections follow, and the last section names related pages.
+/// lines, each of its paragraphs begins with `Heading:`, hand-written sections follow, and the last section lists
+/// related pages.
 fn page(command: Command, hand_written: Option<&String>) -> io::Result<Vec<u8>> {
     let notes = command.get_after_help().map(ToString::to_string).unwrap_or_default();
     let has_subcommands = command.has_subcommands();
@@ -86,10 +87,13 @@ fn page(command: Command, hand_written: Option<&String>) -> io::Result<Vec<u8>> 
         man.render_subcommands_section(&mut page)?;
     }
     for paragraph in notes.split("\n\n").filter(|paragraph| !paragraph.is_empty()) {
-        let heading = paragraph.split([':', ',', '(']).next().unwrap_or_default().trim_end();
-        let text = paragraph.split_once(":\n").map_or(paragraph, |(_, text)| text);
+        let (heading, _) = paragraph.split_once(':').expect("a heading");
+        assert!(!heading.contains(['.', ',', '(', '\n']), "no heading, or a heading with a text: {heading}");
+        let text = paragraph.strip_prefix(heading).and_then(|text| text.strip_prefix(":\n")).unwrap_or(paragraph);
         writeln!(page, ".SH \"{}\"\n.nf", heading.to_uppercase())?;
         for line in text.lines() {
+            // Commands may be longer: they cannot be broken.
+            assert!(line.len() <= 80 || line.starts_with("  cangauge "), "a line of more than 80 characters: {line}");
             // A point or an apostrophe at the start of a line would be a macro.
             let guard = if line.starts_with(['.', '\'']) { "\\&" } else { "" };
             writeln!(page, "{guard}{}", escape(line))?;

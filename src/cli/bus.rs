@@ -39,9 +39,9 @@ enum Action {
     Down(Down),
     /// Find the bit rate of a running bus by listening; print it in bit/s
     ///
-    /// Tries the usual bit rates one after the other, the present one first, until it receives valid frames. It
-    /// sends no frames and no acknowledgements. At the end, and on Ctrl-C, the interface is restored. A single device
-    /// on the bus cannot be detected, because no node acknowledges its frames.
+    /// The usual bit rates are tried one after the other, the present one first, until valid frames are received. The
+    /// command sends no frames and no acknowledgements. At the end, and on Ctrl-C, the interface is restored. A single
+    /// device on the bus cannot be detected, because no node acknowledges its frames.
     Detect(Detect),
 }
 

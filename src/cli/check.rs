@@ -31,24 +31,40 @@ use std::time::Duration as StdDuration;
 
 /// Check measurements against limits (exit code 0: all satisfied, 1: not satisfied, 3: no data)
 ///
-/// Without --for, one reading by SDO is checked. With --for, the command records like log for this time, and checks
-/// each sample. With -b replay:FILE, each sample of the file is checked. An invalid sample fails the check.
+/// Without --for, one reading by SDO is checked. With --for, the command records for this time, as log does, and checks
+/// each sample. With -b replay:FILE, each sample of the file is checked. If a sample is invalid, the check fails. All
+/// expressions must be satisfied.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Expressions (quote each of them; all must be satisfied):
-  'pressure in 9.95..10.05 bar'      both ends belong to the range
-  'temperature < 60 degC'            always state the unit; without one, the unit of the device is used
+Expressions:
+  'pressure in 9.95..10.05 bar'    both ends belong to the range
+  'temperature < 60 degC'          without a unit: the unit of the device
   '|5.pressure - 6.pressure| < 0.1 bar'
-                                     signals of two nodes; a signal without node is checked
-                                     for each of NODES
-  'noise(pressure) < 0.01 bar'       functions of all samples: mean, min, max, noise (standard
-                                     deviation), rate (1/s), gap (longest interval, s), count,
-                                     invalid (number of invalid samples; they do not fail this check)
-  'bus.load < 60 %'                  figures of the bus and of each node, as in cangauge health:
-  'node.heartbeat.max < 1.1 s'       bus.load.peak, bus.errors, node.sdo.p99, node.emcy, node.restarts
-  < <= > >= == != in, + - * /, | |, ( ), and, or, not; pressure.status, 0x6130:1
+                                   the signals of two nodes
+  'noise(pressure) < 0.01 bar'     a function of all samples
+  'bus.load < 60 %'                a figure of the bus
+  'node.heartbeat.max < 1.1 s'     a figure of each node
+  'pressure.status == 0'           the status of a signal
+  '0x6130:1 > 9'                   an object
+Quote each expression. A signal without a node-ID is checked for each node.
 
-Equality: calculated values are equal if they differ by less than 1e-9 of the larger one.
+Operators:
+  < <= > >= == != in  + - * /  | |  ( )  and or not
+Calculated values are equal if they differ by less than 1e-9 of the larger one.
+
+Functions:
+  mean, min, max    of the values
+  noise             standard deviation of the values
+  rate              samples per second
+  gap               longest interval between two samples, in s
+  count             number of samples
+  invalid           number of invalid samples. If an expression contains this
+                    function, invalid samples do not make it fail
+
+Figures of the bus and of each node:
+  bus.load, bus.load.peak, bus.errors
+  node.heartbeat.max, node.sdo.p99, node.emcy, node.restarts
+All figures: cangauge health
 
 Examples:
   cangauge -b sim check 1 'pressure > 0.5 bar'
@@ -69,7 +85,7 @@ pub(crate) struct Check {
     /// Read by SDO at this interval
     #[arg(long, value_name = "DUR", requires = "duration", value_parser = poll_interval)]
     poll: Option<Duration>,
-    /// Write the verdicts as JUnit XML for CI servers, one test case per expression and node. An existing file is
+    /// Write the verdicts as JUnit XML for CI servers: one test case per expression and node. An existing file is
     /// replaced
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,

@@ -24,9 +24,11 @@ use std::sync::Arc;
 
 /// Print or install the completion script for a shell
 ///
-/// "install" writes the script to the user's folder of bash, zsh or fish, and prints its path.
-/// The script completes commands, options, buses, device names, units, and the names of signals and objects: those in
-/// --device and --eds, else those of the built-in descriptions. It uses no bus.
+/// "install" writes the script to the folder of the user for bash, zsh or fish, and prints its path.
+///
+/// The script completes commands, options, buses, and the names of devices, units, signals and objects. Signals and
+/// objects are those of --device and --eds. Without these options, they are those of the built-in descriptions. The
+/// script uses no bus.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge completions install\n  cangauge completions bash > cangauge.bash")]
 pub(crate) struct Completions {

@@ -98,8 +98,8 @@ fn combine(named: &[Named], nodes: &[NodeId], misfits: &Misfits) -> Overrides {
     overrides
 }
 
-/// Compares vendor and product of the files with those of the devices (1018h). Returns the files that are not used, each
-/// with the node.
+/// Compares vendor and product of the files with those of the devices (1018h). Returns the files that are not used,
+/// each with the node.
 fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[NodeId]) -> anyhow::Result<Misfits> {
     let mut misfits = Misfits::new();
     let is_compared = |device: &MadeFor| device.vendor.or(device.product).is_some();

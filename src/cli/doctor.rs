@@ -14,15 +14,15 @@ use clap::Args;
 
 /// Find out why a node or the whole bus is silent
 ///
-/// Looks for nodes and observes their TPDOs for up to 5 s. Then reads the status of the values, the error registers,
-/// and the objects that explain a silence. Nothing is changed. Each finding is followed by the command to type. Exit
-/// code 0: no problem, 1: a problem was found.
+/// The command looks for nodes and observes their TPDOs for up to 5 s. Then it reads the status of the values, the
+/// error registers, and the objects that explain why a node is silent. It changes nothing. After each finding, it shows
+/// the command to type. The exit code is 0 if there is no problem, and 1 if a problem was found.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge doctor 5\n  cangauge doctor --passive\n  cangauge doctor all --format json"
 )]
 pub(crate) struct Doctor {
-    /// Node-ID: 5, 0x7f, or all. If no node answers, all also looks for devices without a node-ID (LSS)
+    /// Node-ID: 5, 0x7f, or all. With all, devices without a node-ID are also searched (LSS) if no node answers
     /// [default: every node]
     node: Option<Nodes>,
     /// Send nothing

@@ -9,7 +9,8 @@ use clap::Args;
 
 /// Show the errors of a device, register (1001h) and history (1003h), or clear the history
 ///
-/// The meaning of an error code comes from the description of the device, otherwise from its class in CiA 301.
+/// The meaning of an error code is taken from the description of the device. If it is not there, the error class of
+/// CiA 301 is shown.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim errors 1\n  cangauge -b sim errors 1 --clear")]
 pub(crate) struct Errors {

@@ -108,7 +108,7 @@ impl OutFile {
         Ok(lines)
     }
 
-    /// The file for a writer that keeps its first `keep` bytes and replaces the rest.
+    /// The target for a writer. The first `keep` bytes of the file stay, and the rest is replaced.
     pub(super) fn target(&self, keep: u64) -> anyhow::Result<OutputTarget> {
         let file = self.file.try_clone().map_err(|source| self.error(source))?;
         Ok(if self.is_own_stream {

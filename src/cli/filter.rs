@@ -10,8 +10,9 @@ use clap::{Args, ValueEnum};
 
 /// Show or set the filter of a signal: type (61A0h) and constant (61A1h)
 ///
-/// Filter types have the meaning in the manual of the device: 0 does not mean "no filter" on every device. After a
-/// change, the filter is read back. A damping cannot be read back; the filter constant shows its effect.
+/// The meaning of a filter type depends on the device: on some devices, 0 is a filter. After a change, the filter is
+/// read back. The device does not return the damping. It returns the filter constant that it calculated from the
+/// damping.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim filter 1\n  cangauge -b sim filter 1 pressure --type moving --constant 8\n  cangauge -b sim filter 1 --type moving --damping 100ms"

@@ -13,10 +13,13 @@ use clap::Args;
 
 /// Measure the load of the bus, heartbeat intervals and SDO answer times
 ///
-/// Reads 1017h once and then 1000h of each node, at most every 100 ms and with at most 5 % of the bus. Heartbeats are
-/// shown as min / mean / max, answer times as min / mean / 99 % / max (number). Limits: load 60 %, in one second 80 %;
-/// heartbeat 1.5 times its time (1017h); 99 % of the SDO answers within 100 ms; no errors, emergencies or restarts. The
-/// same figures can be checked: cangauge check 5 'node.heartbeat.max < 1.1 s' 'bus.load < 60 %' --for 10s.
+/// Reads 1017h of each node once, and then 1000h repeatedly. Each node is read at most once in 100 ms, and all reads
+/// together take at most 5 % of the bus. Heartbeat intervals are shown as min / mean / max. SDO answer times are shown
+/// as min / mean / 99th percentile / max (number).
+///
+/// The limits are: mean load 60 %; load in each second 80 %; heartbeat interval 1.5 times the heartbeat time (1017h);
+/// 99 % of the SDO answers within 100 ms; no errors, emergencies or restarts. The command check compares the same
+/// figures with your own limits: cangauge check 5 'node.heartbeat.max < 1.1 s' 'bus.load < 60 %' --for 10s.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim health --for 5s\n  cangauge health 5,6 --for 1h\n  cangauge health --passive\n  cangauge -b replay:trace.log health --bitrate 250k"
@@ -25,10 +28,10 @@ pub(crate) struct HealthCommand {
     /// Nodes: 5, 0x7f, 1-16, 1,5, all
     #[arg(default_value = "all")]
     nodes: Nodes,
-    /// Measure for this time; a recording to its end
+    /// Measure for this time [default: 10s; a recording is measured to its end]
     #[arg(short, long = "for", visible_alias = "duration", value_name = "DUR")]
     duration: Option<Duration>,
-    /// Send nothing: SDO answer times come from the reads of other masters
+    /// Send nothing. SDO answer times are then measured at the reads of other masters
     #[arg(long)]
     pub(super) passive: bool,
     /// Bit rate of the bus, if the interface does not report it: 250k

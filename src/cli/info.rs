@@ -20,7 +20,7 @@ use clap::Args;
 pub(crate) struct Info {
     /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// Listen without sending anything; show state and identity, as far as other masters have read it
+    /// Send nothing. Show the state, and the identity if another master reads it
     #[arg(long)]
     pub(super) passive: bool,
 }

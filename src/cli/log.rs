@@ -36,16 +36,27 @@ use std::io::{self, IsTerminal};
 /// known.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Columns: time (UTC), elapsed_s, node, signal, value, unit, status (ok, invalid, overload-high,
-overload-low, clipped; empty if the device reports none), raw (bytes in wire order).
-Layout wide: time, elapsed_s, then 5.pressure [bar] and 5.pressure.status for each signal.
-Each cycle is a row with the time of its first value. Cells without data are empty. If a mapping or
-a unit changes, the new columns start a new file.
+Columns:
+  time                  UTC
+  elapsed_s             seconds since the first row
+  node, signal, value, unit
+  status                ok, invalid, overload-high, overload-low or clipped;
+                        empty if the device reports no status
+  raw                   the bytes of the value in wire order
 
-Slow output: up to 12 MiB of rows wait for it. Further rows are lost and counted (exit code 8).
+Columns of --layout wide:
+  time, elapsed_s
+  5.pressure [bar], 5.pressure.status, and so on for each signal
+Each cycle is a row with the time of its first value. Cells without data are
+empty. If a mapping or a unit changes, a new file is started.
 
-Early end: with --count or --duration, a recording that ends earlier exits with 130 (Ctrl-C) or 8
-(output closed).
+Slow output:
+Up to 12 MiB of rows can wait for the output. Further rows are lost and counted,
+and the exit code is 8.
+
+Early end:
+If the recording ends before --count or --duration is reached, the exit code is
+130 (Ctrl-C) or 8 (output closed).
 
 Examples:
   cangauge -b sim log 1 --sync 100ms --count 20
@@ -75,19 +86,20 @@ pub(crate) struct Log {
     /// Request TPDOs by remote frames (RTR) at this interval. The values may be old; prefer --poll
     #[arg(long, value_name = "DUR", conflicts_with_all = ["sync", "poll", "passive"], value_parser = request_interval)]
     request: Option<Duration>,
-    /// Send nothing at all
+    /// Send nothing
     #[arg(long)]
     pub(super) passive: bool,
-    /// Start every node, also drives and inputs or outputs, and beside another NMT master [default: sensors]
+    /// Start all nodes, also drives and I/O modules, and even if another NMT master is seen [default: start only
+    /// sensors]
     #[arg(long, conflicts_with_all = ["no_nmt", "passive", "poll"])]
     start: bool,
-    /// Do not change the NMT state of the nodes [default: if another NMT master is seen]
+    /// Do not change the NMT state of the nodes. This is the default if another NMT master is seen
     #[arg(long)]
     no_nmt: bool,
     /// Report longer intervals as gaps [default: 3 times the usual interval]
     #[arg(long, value_name = "DUR")]
     max_gap: Option<Duration>,
-    /// Exit with 1 at the end if this expression failed: 'pressure in 9..11 bar' (see cangauge check --help)
+    /// Exit with 1 at the end if this expression is not satisfied: 'pressure in 9..11 bar' (see cangauge check --help)
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     expect: Vec<Expression>,
     /// Plot the values at the end, on stderr (see cangauge plot)

@@ -64,23 +64,44 @@ use std::path::PathBuf;
 const GLOBAL_OPTIONS: &str = "Global options: see cangauge --help";
 
 const EXAMPLES: &str = "\
-Examples on the simulated bus (omit `-b sim` if one CAN interface is up):
-  cangauge -b sim scan                                   find the nodes
-  cangauge -b sim read 1                                 read measured values
-  cangauge -b sim log 1 --sync 100ms --count 20          record measurements as CSV
+Buses:
+  can0                      a SocketCAN interface
+  slcan:/dev/ttyACM0@250k   a serial adapter, and the bit rate of the bus
+  slcan:tcp://HOST:PORT@250k
+                            a serial adapter on the network
+  socketcand://HOST/can0    a CAN interface of another computer
+  sim                       four simulated devices
+  sim:mh4@5,dps@127         other simulated devices
+  sim:mh4@5:pressure=0bar:temperature=20degC
+                            a simulated device with constant values
+  sim:FILE.toml             the devices in a bench file
+  replay:FILE               a recording of candump, Vector ASC, PEAK TRC or
+                            python-can CSV; receive only
+  replay:FILE:can1          one channel of a recording
+
+Examples:
+  cangauge -b sim scan                             find the nodes
+  cangauge -b sim read 1                           read measured values
+  cangauge -b sim log 1 --sync 100ms --count 20    record measurements as CSV
   cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv
-  cangauge -b sim info 1                                 show everything about a device
-  cangauge -b sim unit 127 bar                           set the unit; show the rescaled values
-  cangauge -b sim sdo read 1 0x1018:1                    read one object
-  cangauge -b sim nmt reset 1                            reset a node and wait for its boot-up
-  cangauge -b sim lss set-id 127 12                      set the node-ID and verify it
+  cangauge -b sim info 1                           show all about a device
+  cangauge -b sim unit 127 bar                     set the unit
+  cangauge -b sim sdo read 1 0x1018:1              read one object
+  cangauge -b sim nmt reset 1                      reset a node
+  cangauge -b sim lss set-id 127 12                set and verify the node-ID
+These examples use the simulated bus. For a real bus, omit -b sim.
 
 Exit codes:
-  0  success                                 5  bus error: interface missing, down, bus-off
-  1  check failed, or stopped for safety     6  unexpected answer or state
-  2  usage error: nothing was changed        7  some nodes succeeded and some failed
-  3  no answer in time                       8  file or stream error
-  4  rejected by the device                130  interrupted before there was a result";
+  0    success
+  1    check failed, or stopped for safety
+  2    usage error: nothing was changed
+  3    no answer in time
+  4    rejected by the device
+  5    bus error: the interface is missing, down or bus-off
+  6    unexpected answer or state
+  7    some nodes succeeded and some failed
+  8    file or stream error
+  130  interrupted before there was a result";
 
 /// Find, configure and log CANopen measuring devices (CiA 404): pressure and temperature transmitters,
 /// thermocouple modules
@@ -98,10 +119,8 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Bus: can0 (SocketCAN), socketcand://HOST/can0 (a remote one), slcan:/dev/ttyACM0@250k or slcan:tcp://HOST:PORT@250k
-    /// (a serial adapter; @ and the bit rate of the bus), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump,
-    /// Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that
-    /// is up]
+    /// Bus: can0, slcan:..., socketcand://..., sim, sim:..., replay:FILE (see below) [default: the only CAN interface
+    /// that is up]
     #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
     pub(crate) bus: Option<BusSpec>,
 
@@ -118,12 +137,12 @@ pub struct Global {
     #[arg(long, global = true, value_name = "[NODE=]NAME|FILE")]
     pub(crate) device: Vec<Override>,
 
-    /// Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes
+    /// Use objects, names and types from an EDS or DCF file. For one of several nodes: NODE=FILE
     #[arg(long, global = true, value_name = "[NODE=]FILE")]
     pub(crate) eds: Vec<Override>,
 
-    /// COB-IDs of requests and answers, if the SDO channel of a node is not the usual one: 0x645:0x5C5; NODE=TX:RX for
-    /// one of several nodes
+    /// COB-IDs of the SDO requests and answers, if they are not the usual COB-IDs: 0x645:0x5C5. For one of several
+    /// nodes: NODE=TX:RX
     #[arg(long, global = true, value_name = "[NODE=]TX:RX")]
     pub(crate) sdo: Vec<Channel>,
 
@@ -143,7 +162,8 @@ pub struct Global {
     #[arg(long, global = true)]
     pub(crate) pace: bool,
 
-    /// Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)
+    /// Write every frame to FILE in the format of candump -L, or for Wireshark if the name ends in .pcapng; - for
+    /// stderr
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) trace: Option<PathBuf>,
 

@@ -15,20 +15,20 @@ use std::ops::ControlFlow;
 
 /// Show all traffic on the bus in words, until Ctrl-C
 ///
-/// SDO transfers are shown when they are complete, with name, value and unit. TPDOs are decoded if the mapping is
-/// known: from SDO traffic that is seen, or from --device or --eds. Unknown frames are shown as bytes. Sends nothing.
+/// SDO transfers are shown when they are complete, with name, value and unit. TPDOs are decoded if the mapping is known
+/// from observed SDO traffic, --device or --eds. Unknown frames are shown as bytes. The command sends nothing.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge monitor\n  cangauge monitor 5 --kind sdo,emcy\n  cangauge monitor --device 5=mh4 --duration 10s\n  cangauge -b replay:trace.log monitor --format json"
 )]
 pub(crate) struct Monitor {
-    /// Only these nodes, and messages that do not belong to one node: 5, 0x7f, 1-16, 1,5, all
+    /// Show only these nodes, and messages that do not belong to one node: 5, 0x7f, 1-16, 1,5, all
     #[arg(default_value = "all")]
     nodes: Nodes,
-    /// Only these kinds of messages [default: all]
+    /// Show only these kinds of messages [default: all]
     #[arg(short, long, value_name = "KIND", value_delimiter = ',')]
     kind: Vec<FrameKind>,
-    /// Show repetitions too: heartbeats without a change of the state, repeated error frames
+    /// Also show repetitions: heartbeats without a change of the state, repeated error frames
     #[arg(short, long)]
     all: bool,
     /// End after this time

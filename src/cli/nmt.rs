@@ -21,8 +21,8 @@ use std::ops::ControlFlow;
 /// Send NMT commands and show NMT states
 ///
 /// After a command, the state is confirmed by a heartbeat, a boot-up message or node guarding. After "stop", the state
-/// is confirmed if the node no longer answers SDO. Node guarding is not used if it would start life guarding, or if
-/// another master uses it. Unconfirmed states are shown as "none".
+/// is also confirmed if the node no longer answers SDO. Node guarding is not used if it would start life guarding, or
+/// if another master uses it. Unconfirmed states are shown as "none".
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim nmt start 1\n  cangauge -b sim nmt reset 127\n  cangauge -b sim nmt state 1-3"
@@ -45,7 +45,7 @@ enum Action {
     Reset(Targets),
     /// Restart the communication
     ResetComm(Targets),
-    /// Show states, from the heartbeat or node guarding; "-" if unknown
+    /// Show the states in the heartbeats or from node guarding; "-" if unknown
     State(StateArgs),
     /// Follow heartbeats, boot-ups and losses until Ctrl-C
     Watch(WatchArgs),
@@ -55,7 +55,7 @@ enum Action {
 
 #[derive(Debug, Args)]
 struct Targets {
-    /// Nodes: 5, 0x7f, 1-16, 1,5; all is one broadcast
+    /// Nodes: 5, 0x7f, 1-16, 1,5; "all" sends one broadcast
     nodes: Nodes,
     /// Exit with 3 if the state cannot be confirmed
     #[arg(long, conflicts_with = "no_wait")]
@@ -76,7 +76,8 @@ struct StateArgs {
 
 #[derive(Debug, Args)]
 struct WatchArgs {
-    /// Nodes: 5, 0x7f, 1-16, 1,5. For these nodes, the heartbeat time is read (1017h); for all, it is measured
+    /// Nodes: 5, 0x7f, 1-16, 1,5, all. If nodes are listed, their heartbeat times are read (1017h). With "all", they
+    /// are measured
     #[arg(default_value = "all")]
     nodes: Nodes,
     /// End after this time

@@ -33,7 +33,7 @@ const WAIT_INTERVAL: Duration = Duration::from_millis(200);
 /// The longest wait for another program that uses the same nodes.
 const CLAIM_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// The longest wait for the reader of a trace that is a FIFO. The claims are held meanwhile.
+/// The longest wait for the reader of a trace that is a FIFO. The nodes stay locked during this time.
 const TRACE_READER_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The bus given by the options, or else the only CAN interface that is up.
@@ -50,7 +50,7 @@ pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
     open_as(global, &spec(global)?, false)
 }
 
-/// Claims the nodes that the command uses. A simulated bus and a recording are not shared with other processes.
+/// Locks the nodes that the command uses. A simulated bus and a recording are not shared with other processes.
 pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> {
     let bus = match spec {
         BusSpec::SocketCan(name) => name.clone(),
@@ -96,8 +96,8 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
     Ok(if channels.is_empty() { bus } else { Box::new(SdoChannels::new(bus, &channels)) })
 }
 
-/// The bus with a trace, if requested. The trace is opened after the bus: without a bus, an existing trace keeps its
-/// content. Nothing was sent yet.
+/// The bus with a trace, if requested. The trace is opened after the bus: if the bus cannot be opened, an existing
+/// trace is not overwritten. No frame is missing in the trace, because nothing is sent before.
 pub(super) fn traced(global: &Global, bus: Box<dyn Bus>) -> anyhow::Result<Box<dyn Bus>> {
     let Some(path) = &global.trace else { return Ok(bus) };
     let (out, name) = trace_output(path)?;
@@ -160,7 +160,7 @@ fn recording(global: &Global, spec: &str) -> anyhow::Result<Replay> {
     Ok(if global.pace { bus.in_real_time(Box::new(interrupts()?)) } else { bus })
 }
 
-/// Converts the error of opening a bus: Ctrl-C ends the wait for the other side.
+/// Converts the error of opening a bus. Ctrl-C while connecting to a server is not an error of the bus.
 fn interrupted(error: BusError) -> Failure {
     match error {
         BusError::Io { source, .. } if source.kind() == io::ErrorKind::Interrupted => Error::Interrupted.into(),
@@ -174,10 +174,11 @@ fn is_missing(error: &BusError) -> Option<String> {
         .then(|| error.to_string())
 }
 
-/// Repeats `attempt` within `--wait`, while `obstacle` returns a reason that may change.
+/// Repeats `attempt` within `--wait`, while `obstacle` returns a temporary reason. The inner result is that of the last
+/// attempt.
 ///
 /// # Errors
-/// Ctrl-C. The result inside is that of the last attempt.
+/// Ctrl-C.
 fn within<T, E>(
     global: &Global,
     mut attempt: impl FnMut() -> Result<T, E>,

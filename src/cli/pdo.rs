@@ -61,8 +61,8 @@ struct MapArgs {
     /// keep the mapping]
     #[arg(value_name = "SIGNAL|OBJECT")]
     signals: Vec<Item>,
-    /// Transmission type: acyclic (on SYNC after a change), sync:N (on every N-th SYNC), event (255), timer (event timer),
-    /// or a number
+    /// Transmission type: acyclic (on SYNC after a change), sync:N (on every N-th SYNC), event (255), timer (event
+    /// timer), or a number
     #[arg(long, value_name = "HOW", value_parser = transmission)]
     transmission: Option<Trigger>,
     /// Event timer, in whole milliseconds; 0: off

@@ -19,11 +19,13 @@ use std::str::FromStr;
 
 /// Plot recordings of log, in the terminal or as SVG or PNG
 ///
-/// Signals with one unit share one panel. Gaps are longer than three usual intervals and break the line. Overload,
-/// invalid and clipped values are marked.
+/// Signals with the same unit share one panel. If an interval is longer than three usual intervals, the line is
+/// interrupted. Overload, invalid and clipped values are marked.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Times are in the time zone of this computer. For another one: TZ=UTC cangauge plot run.csv
+Time zone:
+Times are in the time zone of this computer. This command uses another time zone:
+  TZ=UTC cangauge plot run.csv
 
 Examples:
   cangauge plot run.csv
@@ -32,8 +34,8 @@ Examples:
   cangauge plot run-*.csv --elapsed --to 10m -o run.png
   cangauge log 1 --duration 10s | cangauge plot -")]
 pub(crate) struct Plot {
-    /// Files of log: CSV or JSON Lines, also compressed with gzip; - for stdin. run.csv stands for run-0001.csv and so
-    /// on if it does not exist
+    /// Files of log: CSV or JSON Lines, also compressed with gzip; - for stdin. If run.csv does not exist,
+    /// run-0001.csv, run-0002.csv and so on are read
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Write the plot to a file: .svg or .png. An existing file is replaced
@@ -51,7 +53,7 @@ pub(crate) struct Plot {
     /// End here
     #[arg(long, value_name = "TIME")]
     to: Option<Moment>,
-    /// Show the time since the start of the run. Several runs are compared
+    /// Show the time since the start of the run, to compare several runs
     #[arg(long)]
     elapsed: bool,
 }
@@ -115,7 +117,7 @@ impl Moment {
             (Moment::OfDay(of_day), TimeAxis::Clock(zone)) => {
                 let start = first + zone(first);
                 let at = start.div_euclid(DAY) * DAY + of_day - zone(first);
-                // The minute of the first value is the same day; an earlier one, the next.
+                // The minute of the first value is on the same day. An earlier minute is on the next day.
                 Some(if at + 60_000_000 > first { at } else { at + DAY })
             }
         }
@@ -221,7 +223,7 @@ fn parts(file: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(if parts.is_empty() { vec![file.to_owned()] } else { parts })
 }
 
-/// Reads a file, and reports what was not read.
+/// Reads a file, and reports the lines that could not be read.
 fn read(path: &Path, recording: &mut Recording, global: &Global) -> anyhow::Result<()> {
     let name = path.display();
     let failed = |verb: &str, source| FileError { what: format!("{verb} {name}"), source };

@@ -20,8 +20,8 @@ pub(super) const SCAN_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// List every node that answers, with its state, identity and recognised device
 ///
-/// The device type of every node is read in parallel; nodes without an answer are asked once more. The state comes from
-/// the heartbeat; "-" if the node sends no heartbeat.
+/// The device types of all nodes are read at the same time. If a node does not answer, the read is repeated once. The
+/// state is that of the heartbeat, and "-" if the node sends no heartbeat.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim scan\n  cangauge -b sim scan 1-16 --format json")]
 pub(crate) struct Scan {

@@ -17,22 +17,22 @@ use std::path::PathBuf;
 ///
 /// The devices answer, send and fail as described in their manuals. Use them to test other programs.
 ///
-/// Lines on standard input change values and cause faults: `pressure 1 5.2bar` holds a value, `silent 1` and `talk 1` stop
-/// and resume all traffic of a node, `emcy 1 F001` sends an emergency (0000 ends it), `unplug 1` and `plug 1` switch a
-/// device off and on.
+/// Lines on standard input change values and cause faults: `pressure 1 5.2bar` holds a value, `silent 1` and `talk 1`
+/// stop and resume all traffic of a node, `emcy 1 F001` sends an emergency (0000 ends it), `unplug 1` and `plug 1`
+/// switch a device off and on.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b vcan0 sim mh4@5 dps@127\n  cangauge -b vcan0 sim bench.toml\n  \
                   cangauge sim mh4@5 --listen 29536      then: cangauge -b socketcand://localhost/can0 scan")]
 pub(crate) struct Sim {
-    /// Devices: mh4@5 dps@127, mh4@unconfigured for one without a node-ID, mh4@5:pressure=0bar with a constant value,
-    /// FILE.eds@5 from an EDS; or a bench file in TOML
+    /// Devices: mh4@5 dps@127; mh4@unconfigured is a device without a node-ID; mh4@5:pressure=0bar:temperature=20degC
+    /// has constant values; FILE.eds@5 is a device from its EDS. Or a bench file in TOML
     #[arg(required = true, value_name = "DEVICE@NODE|FILE.toml")]
     devices: Vec<String>,
-    /// Serve the devices at this TCP port to other programs, as a socketcand server, in place of a bus. Without an
+    /// Serve the devices to other programs at this TCP port as a socketcand server, instead of a bus. Without an
     /// address, only programs on this computer can connect
     #[arg(long, value_name = "[ADDR:]PORT")]
     listen: Option<Address>,
-    /// Keep what the devices store, and their node-IDs, in this file for the next run
+    /// Keep the stored settings of the devices and their node-IDs in this file for the next run
     #[arg(long, value_name = "FILE")]
     state: Option<PathBuf>,
 }

@@ -13,10 +13,10 @@ use clap::{Args, ValueEnum};
 
 /// Save settings to non-volatile memory (1010h)
 ///
-/// The capability of the device is read first. "save" is sent once and never repeated; the time-out is at least 3 s. If
-/// storing everything would reset custom COB-IDs (MH-4), comm and app are stored instead. Settings that the device does
-/// not store are listed. After a restore, reset the device before you store. Otherwise the device stores its old
-/// settings again.
+/// First, 1010h is read: it shows which settings the device can store. "save" is sent once and never repeated. The
+/// time-out is at least 3 s. If storing everything would reset custom COB-IDs (MH-4), comm and app are stored instead.
+/// Settings that the device does not store are listed. After a restore, reset the device before you store. Otherwise
+/// the device stores its old settings again.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim store 1\n  cangauge -b sim store 1 --group app --verify\n  cangauge -b sim store 1,127 --format json"
@@ -34,8 +34,8 @@ pub(crate) struct Store {
 
 /// Restore factory defaults (1011h), except node-ID and bit rate
 ///
-/// "load" is sent once and never repeated; the time-out is at least 3 s. The defaults are used after the next reset of
-/// the node; a store before that may keep the old settings.
+/// "load" is sent once and never repeated. The time-out is at least 3 s. The device uses the defaults after its next
+/// reset. If you store before the reset, the device may keep its old settings.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim restore 1 --reset\n  cangauge -b sim restore 1 --group comm --reset\n  cangauge -b sim restore 127"
@@ -46,7 +46,7 @@ pub(crate) struct Restore {
     /// Settings: all, communication (1000h to 1FFFh), or application (6000h to 9FFFh)
     #[arg(long, default_value = "all")]
     group: GroupArg,
-    /// Reset the node, and compare with its description
+    /// Reset the node, and compare its settings with the defaults in its description
     #[arg(long)]
     reset: bool,
 }

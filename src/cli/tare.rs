@@ -9,8 +9,9 @@ use clap::Args;
 
 /// Set the net value of a channel to zero (6139h), or restore it (--undo)
 ///
-/// The net value is the process value minus the tare zero. The command measures, writes the signature once, and measures
-/// again. It prints the tare zero before and after, and on stderr the command to undo it. It never stores.
+/// The net value is the process value minus the tare zero. The command measures, writes the signature once, and
+/// measures again. The tare zero before and after is printed, and the command to undo it is printed on stderr. The tare
+/// zero is not stored.
 ///
 /// The description (--device) or EDS (--eds) must contain 6139h and the net value (6140h, 7140h ...). Each reading must
 /// be valid, and the readings may vary by at most 0.5 % of the measuring range. Otherwise nothing is changed (exit 1).

@@ -15,7 +15,7 @@ use clap::Args;
 /// Show or set the physical unit of a signal (6131h)
 ///
 /// After a change, the unit is read back. All values that the device converts are also read back: measuring range,
-/// offset, limits, process value. The unit of a single signal is printed without its name.
+/// offset, limits, process value. For a single signal, only the unit is printed.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim unit 1\n  cangauge -b sim unit 1 temperature K\n  cangauge -b sim unit 1 pressure 0x06220000"
@@ -23,8 +23,8 @@ use clap::Args;
 pub(crate) struct Unit {
     /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// Signal (pressure, temperature, ch1 to ch16; several: ch1-ch4, ch1,ch3, all), and the unit to set (bar, psi, MPa, kPa, mbar, degC, K, or the
-    /// code 0x004E0000)
+    /// Signal (pressure, temperature, ch1 to ch16; several: ch1-ch4, ch1,ch3, all), and the unit to set (bar, psi, MPa,
+    /// kPa, mbar, degC, K, or the code 0x004E0000)
     #[arg(value_names = ["SIGNAL", "UNIT"], num_args = 0..=2)]
     words: Vec<String>,
 }

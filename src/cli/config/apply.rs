@@ -32,11 +32,11 @@ use std::path::{Path, PathBuf};
 
 /// Configure a device from a file: check the file, write the differences, read everything back
 ///
-/// Order: sensor type, unit, digits, filter, limits, other objects, guarding and heartbeat, TPDOs, COB-IDs, store;
-/// finally node-ID and bit rate. A second run prints "0 changes". If a write fails, the error lists the written
-/// settings and the missing ones. Run the same command again to continue, or with --rollback to restore the old
-/// settings. The old settings are kept in $XDG_STATE_HOME/cangauge (or ~/.local/state/cangauge) until the change is
-/// complete.
+/// Settings are written in this order: sensor type, unit, digits, filter, limits, other objects, guarding and
+/// heartbeat, TPDOs, COB-IDs. Then they are stored. Node-ID and bit rate come last. A second run prints "0 changes". If
+/// a write fails, the error lists the written settings and the missing ones. Run the same command again to continue, or
+/// with --rollback to restore the old settings. The old settings are kept in $XDG_STATE_HOME/cangauge (or
+/// ~/.local/state/cangauge) until the change is complete.
 #[derive(Debug, Args)]
 pub(super) struct Apply {
     /// Nodes (5, 0x7f, 1-16, 1,5, all), and the file
@@ -45,7 +45,7 @@ pub(super) struct Apply {
     /// Save to non-volatile memory (1010h)
     #[arg(long)]
     store: bool,
-    /// Reset the node after the store, and read everything again
+    /// Reset the node after storing, and read everything again
     #[arg(long, requires = "store")]
     reset: bool,
     /// Show the writes; change nothing
@@ -54,10 +54,11 @@ pub(super) struct Apply {
     /// Set settings that are not in the file to their factory defaults
     #[arg(long)]
     exact: bool,
-    /// Set [address], too: node-ID, bit rate, explicit COB-IDs, SYNC producer. For one node only
+    /// Also set the section [address]: node-ID, bit rate, COB-IDs that are set in the file, SYNC producer. For one node
+    /// only
     #[arg(long)]
     address: bool,
-    /// Set [calibration], too. The serial number must be equal
+    /// Also set the section [calibration]. The serial number in the file must be that of the device
     #[arg(long)]
     with_calibration: bool,
     /// Restore the settings saved before the last failed or interrupted apply
@@ -68,11 +69,12 @@ pub(super) struct Apply {
     #[arg(long, value_name = "FILE.csv", conflicts_with = "rollback")]
     table: Option<PathBuf>,
     /// Set devices that are plugged in one after the other, each with the values of its row. Includes --address and
-    /// --store. The result is written to the column "result" of the table. To compare the serial number with the label,
-    /// type it before the device is plugged in
+    /// --store. The result is written to the column "result" of the table. To check the serial number on the label,
+    /// type this number before you plug in the device
     #[arg(long, requires = "table", conflicts_with = "dry_run")]
     prompt: bool,
-    /// Write a record: time, devices, old and new values, verification. HTML if the name ends with .html, else JSON
+    /// Write a report: time, devices, old and new values, verification. It is HTML if the name ends with .html, else
+    /// JSON
     #[arg(long, value_name = "FILE", conflicts_with = "dry_run")]
     record: Option<PathBuf>,
 }

@@ -40,7 +40,7 @@ pub(super) struct Files {
     /// Write events as CSV: emergencies, gaps, node losses, reboots
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
-    /// Write the summary as JSON to a file, which is replaced unless --append; - for stdout
+    /// Write the summary as JSON to a file; - for stdout. Without --append, an existing file is replaced
     #[arg(long, value_name = "FILE")]
     pub(super) summary: Option<PathBuf>,
     /// Delimiter of CSV: , ; | or tab [default: ,]
@@ -49,7 +49,7 @@ pub(super) struct Files {
     /// Decimal sign of CSV: . or , [default: .]
     #[arg(long, value_name = "CHAR")]
     decimal: Option<Decimal>,
-    /// Start CSV with a byte order mark, which some spreadsheets need
+    /// Start the CSV with a byte order mark: some spreadsheets need it
     #[arg(long)]
     bom: bool,
     /// Format of times: text (RFC 3339), seconds since 1970, or days as in spreadsheets; all UTC

@@ -43,7 +43,7 @@ pub(super) struct SetBitrate {
     options: Options,
 }
 
-/// Set the node-ID and bit rate of a device, with one store and one reset
+/// Set the node-ID and bit rate of a device, and store and reset only once
 #[derive(Debug, Args)]
 pub(super) struct Set {
     /// Device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured
@@ -62,11 +62,11 @@ pub(super) struct Set {
 
 #[derive(Debug, Args)]
 struct RateOptions {
-    /// Index of the bit rate in the table of the device; --retime also needs RATE
+    /// Index of the bit rate in the table of the device. With --retime, also give RATE
     #[arg(long, value_name = "N")]
     table_index: Option<u8>,
-    /// Also switch the host interface; store after the device responds at the new bit rate. The device must be the only
-    /// one on the bus
+    /// Also set the bit rate of the host interface, and store after the device responds at the new bit rate. It must be
+    /// the only device on the bus
     #[arg(long)]
     retime: bool,
 }
@@ -79,7 +79,7 @@ struct Options {
     /// Method: lss, sdo (objects of the device), or auto (the preferred method in its description)
     #[arg(long, value_name = "WAY", default_value = "auto")]
     via: ViaArg,
-    /// Accept more than one device for "only": all of them change
+    /// Accept more than one device for "only": all of them are changed
     #[arg(long)]
     force: bool,
 }

@@ -110,8 +110,8 @@ impl Series<'_> {
         }
     }
 
-    /// Waits for exactly one new device. Returns it with the line that was typed meanwhile, the serial number on its
-    /// label. `None`: the input ended.
+    /// Waits for exactly one new device. Returns the device, and the serial number on its label if the user typed it
+    /// during the wait. Returns `None` if the input ended.
     fn next(&mut self, master: &mut Master<'_>) -> Result<Option<(FoundSlave, Option<String>)>, Failure> {
         let (mut label, mut reported) = (None, 0);
         loop {
