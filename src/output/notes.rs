@@ -100,7 +100,7 @@ pub fn note(note: &Note) -> NoteText {
         }
         Fact::LeftOperational => NoteText::new(
             "left-operational",
-            "the node was started; its previous state is unknown, so it stays operational",
+            "the node was started and stays operational: its previous state is unknown and cannot be restored",
         ),
         Fact::Rule(rule) => rule_text("", rule),
         Fact::MayClip(value) => NoteText::new("may-clip", doubt::may_clip(value)),
@@ -139,7 +139,7 @@ fn state_text(node: &str, state: StateEffect) -> NoteText {
     match state {
         StateEffect::Unknown => NoteText::new(
             "left-pre-operational",
-            "the node was set to PRE-OPERATIONAL; its previous state is unknown, so it stays there",
+            "the node was set to PRE-OPERATIONAL and stays there: its previous state is unknown and cannot be restored",
         )
         .command("start it", format!("cangauge nmt start {node}")),
         StateEffect::Differs { before, now } => {

@@ -42,7 +42,7 @@ fn known_state_is_restored() {
 fn unknown_state_is_not_guessed() {
     let done = Bench::of("mh4@5,mh4@6").run("log 5 --sync 10ms --count 10").exit(0);
     assert_eq!(done.frames_of("000"), ["0105"], "named nodes only");
-    let said = "node 5 was started; its previous state is unknown, so it stays operational\n";
+    let said = "node 5 was started and stays operational: its previous state is unknown and cannot be restored\n";
     assert!(done.stderr.ends_with(said), "{}", done.stderr);
 }
 
@@ -186,7 +186,7 @@ fn signal(child: &std::process::Child, name: &str) {
     assert!(status.success());
 }
 
-/// `command` as the last arguments of another program that runs it.
+/// A command that starts `command` by another program, for example `nohup`.
 #[cfg(unix)]
 fn started_by(runner: &[&str], command: &Command) -> Command {
     let mut started = Command::new(runner[0]);

@@ -125,10 +125,10 @@ fn device_that_rejects_bit_31_is_mapped_without_it() {
     assert_eq!(note(&mapped.notes[0]).message, warning);
     // The device has neither heartbeat nor guarding, so its state is unknown and is not guessed.
     let message = note(&mapped.notes[1]).message;
-    assert!(message.contains("previous state is unknown, so it stays there"), "{message}");
+    assert!(message.contains("stays there: its previous state is unknown"), "{message}");
     assert_eq!((bench.number("1A00:0"), bench.number("1A00:2")), (2, 0x6150_0108));
     assert_eq!(bench.state(), Some(State::PreOperational));
-    // If the description says that the device accepts bit 31, a rejection is an error.
+    // If the device accepts bit 31 according to its description, a rejection is an error.
     let mut bench = Bench::new(description("", &refuses_31));
     let failure = bench.map(&request(&["ch1", "ch1.status"]), true).unwrap_err();
     assert_eq!((failure.kind(), bench.number("1A00:0")), (Kind::Refused, 1));

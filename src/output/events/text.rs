@@ -205,10 +205,13 @@ pub fn remark_text(remark: &Remark) -> String {
 
 fn left_operational(nodes: &[NodeId]) -> String {
     match nodes {
-        [node] => format!("node {node} was started; its previous state is unknown, so it stays operational"),
-        nodes => {
-            format!("nodes {} were started; their previous states are unknown, so they stay operational", listed(nodes))
-        }
+        [node] => format!(
+            "node {node} was started and stays operational: its previous state is unknown and cannot be restored"
+        ),
+        nodes => format!(
+            "nodes {} were started and stay operational: their previous states are unknown and cannot be restored",
+            listed(nodes)
+        ),
     }
 }
 
