@@ -16,14 +16,14 @@
 //!   many transfers in parallel.
 //! - [`measure`] → device, canopen, bus (moments). From frames and answers to samples: decoding, status, statistics,
 //!   expressions. It drives no bus.
-//! - [`node`] → master, measure, device, canopen, bus (the trait). One node: its identity, signals and TPDOs, and how it
-//!   is read, written and waited for.
+//! - [`node`] → master, measure, device, canopen, bus (the trait). One node: its identity, signals and TPDOs, and how
+//!   it is read, written and waited for.
 //! - [`sim`] → bus, device, canopen (values). Simulated devices. They are written from the standard and the manuals,
 //!   without the encoders of the client.
-//! - [`tasks`] → node, measure, master, device, canopen, bus (the trait). The procedures of the commands: set a node-ID,
-//!   map a TPDO, record, check. They return typed reports and typed failures, and print nothing.
-//! - [`output`] → tasks (reports), node, measure, device, canopen (values), bus (moments, faults). All sentences, tables
-//!   and file formats. Part of the feature `cli`.
+//! - [`tasks`] → node, measure, master, device, canopen, bus (the trait). The procedures of the commands: set a
+//!   node-ID, map a TPDO, record, check. They return typed reports and typed failures, and print nothing.
+//! - [`output`] → tasks (reports), node, measure, device, canopen (values), bus (moments, faults). All sentences,
+//!   tables and file formats. Part of the feature `cli`.
 //! - [`cli`] → tasks, output, node, measure, master, sim, bus, device, canopen (values). Arguments and help texts, one
 //!   file for each command. Part of the feature `cli`.
 //!

@@ -1,6 +1,6 @@
 //! A wrapper around a bus for nodes whose SDO channel does not use the COB-IDs 600h and 580h + node-ID.
 //!
-//! The wrapper exchanges the COB-IDs in both directions, so that all other code uses the usual ones. A trace inside the
+//! The wrapper exchanges the COB-IDs in both directions, so all other code uses the usual COB-IDs. A trace inside the
 //! wrapper shows the COB-IDs on the bus.
 
 use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, delegate_bus};
@@ -21,7 +21,7 @@ pub struct SdoChannel {
 /// A bus with nodes whose SDO channels have other COB-IDs.
 pub struct SdoChannels<B> {
     bus: B,
-    /// Pairs of exchanged COB-IDs: the usual one, and the one on the bus.
+    /// Pairs of exchanged COB-IDs: the usual COB-ID, and the COB-ID on the bus.
     pairs: Vec<(CanId, CanId)>,
 }
 

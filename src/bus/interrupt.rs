@@ -59,8 +59,8 @@ impl Interrupts {
     }
 }
 
-/// Reads lines from stdin in a thread. Each is followed by an interrupt, which wakes a program that waits on a bus. Call
-/// it when the bus is open.
+/// Reads lines from stdin in a thread. Each is followed by an interrupt, which wakes a program that waits on a bus.
+/// Call it when the bus is open.
 pub fn lines_with_interrupts() -> std::sync::mpsc::Receiver<String> {
     let (sender, lines) = std::sync::mpsc::channel();
     ignore_background_reads();

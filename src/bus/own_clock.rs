@@ -45,7 +45,7 @@ impl OwnClock {
         Stamp { mono, wall: Wall::at(wall) }
     }
 
-    /// Records a frame with only a kernel time, so that no later frame gets an earlier time.
+    /// Records the time of a frame that has only a kernel time. A later frame then gets no earlier time.
     pub(super) fn pass(&mut self, kernel: Stamp) {
         self.last = kernel.mono;
     }

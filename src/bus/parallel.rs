@@ -1,5 +1,6 @@
-//! Several procedures on one bus at the same time. Each has its own [`Bus`] and its own thread. Only one of them runs at
-//! a time, and the others wait for an event. So the order of the frames depends on the bus only.
+//! Runs several procedures concurrently on one bus. Each procedure has its own [`Bus`] and its own thread. Only one
+//! thread is active at any moment, and the others wait for an event. So the order of the frames depends on the bus
+//! only.
 
 use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, Stamp, TimestampSource};
 use crate::canopen::frame::Frame;
@@ -11,19 +12,20 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-/// The bus load of all procedures on a silent bus: frames with a lower priority, as heartbeats, need the rest.
+/// The highest bus load of all procedures together if there is no other traffic. The rest is for frames of low
+/// priority, such as heartbeats.
 const OWN_LOAD: f64 = 0.9;
 
-/// The bus load together with the traffic of others.
+/// The highest bus load of the procedures and other traffic together.
 const SHARED_LOAD: f64 = 0.5;
 
-/// The lowest load of the procedures, however much traffic there is.
+/// The bus load that the procedures may always use, even if other traffic is heavier.
 const LEAST_LOAD: f64 = 0.05;
 
-/// How long the traffic of others is measured.
+/// The time in which the load of other traffic is measured.
 const WINDOW: Duration = Duration::from_millis(100);
 
-/// The time of the frames that may wait in the transmit queue.
+/// The frames in the transmit queue may together need this time on the bus.
 const QUEUED: Duration = Duration::from_millis(2);
 
 /// Runs `work` for all items at the same time; the results have the order of the items. A procedure cannot change the
@@ -158,25 +160,26 @@ struct Procedure {
     filters: Filters,
     /// Until when it waits for an event; `None` if it waits to send, or ended.
     until: Option<Mono>,
-    /// Events while it waits to send.
+    /// Events that arrived while the procedure waited to send.
     missed: VecDeque<Event>,
 }
 
 /// Limits the bus load of the procedures.
 struct Pace {
-    /// `None`: unknown, so that nothing is limited.
+    /// `None` if it is unknown. The load is then not limited.
     bit_rate: Option<u32>,
     /// When the next frame may be sent.
     ready_at: Mono,
-    /// The end of the present measurement of other traffic, and the time of its frames.
+    /// The end of the present measurement of other traffic.
     window_end: Mono,
+    /// The time that other frames have needed on the bus in this measurement.
     others: Duration,
-    /// The load of other traffic in the last window.
+    /// The load of other traffic in the last measurement.
     load: f64,
 }
 
 impl Pace {
-    /// A frame is sent. Its answer takes as long.
+    /// A frame was sent. Its answer is assumed to have the same length.
     fn on_sent(&mut self, frame: &Frame, now: Mono) {
         let Some(bit_rate) = self.bit_rate else { return };
         if now >= self.window_end {
@@ -197,7 +200,7 @@ impl Pace {
 struct Conductor<'a> {
     bus: &'a mut dyn Bus,
     procedures: Vec<Procedure>,
-    /// The frames that wait for their turn, with their procedures.
+    /// The frames that wait to be sent, with their procedures.
     waiting: VecDeque<(usize, Frame)>,
     pace: Pace,
 }
@@ -222,10 +225,10 @@ impl Conductor<'_> {
         }
     }
 
-    /// Gives an event to the procedures that it concerns.
+    /// Passes an event to the procedures that it concerns.
     fn deliver(&mut self, event: Result<Event, BusError>, now: Mono) {
         let Ok(event) = event else {
-            // The next one that waits gets the next error.
+            // Only one procedure gets this error. The next error goes to the next waiting procedure.
             let Some(at) = self.procedures.iter().position(|procedure| procedure.until.is_some()) else { return };
             return self.answer(at, Answer::Event(event));
         };
@@ -249,7 +252,7 @@ impl Conductor<'_> {
         }
     }
 
-    /// Sends the frames whose turn has come, in their order.
+    /// Sends the waiting frames in their order, as far as the bus load allows it.
     fn send_waiting(&mut self) {
         while self.pace.ready_at <= self.bus.mono()
             && let Some((at, frame)) = self.waiting.pop_front()
@@ -264,7 +267,7 @@ impl Conductor<'_> {
 
     /// Answers a call of a procedure, and carries out its next calls.
     fn answer(&mut self, at: usize, answer: Answer) {
-        // If the procedure has ended, the next call is the end.
+        // If the procedure has ended, this fails, and `serve` sees the end.
         let _ = self.procedures[at].answers.send(answer);
         self.serve(at);
     }
@@ -297,7 +300,7 @@ impl Conductor<'_> {
                     return;
                 }
             };
-            // If the procedure has ended, the next call is the end.
+            // If the procedure has ended, this fails, and the next `recv` reports the end.
             let _ = procedure.answers.send(answer);
         }
     }

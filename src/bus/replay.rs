@@ -42,7 +42,7 @@ const FIRST_DATE: Duration = Duration::from_secs(100_000_000);
 /// A longer time between two lines is a step of the clock, for example from 1970 to the present.
 const LONGEST_PAUSE: Duration = Duration::from_secs(24 * 3600);
 
-/// A line may be earlier than the previous one by this time. Interrupts of two controllers are not in order.
+/// A line may be earlier than the previous line by this time. Interrupts of two controllers are not in order.
 const DISORDER: Duration = Duration::from_millis(10);
 
 /// Reads the lines of one format.
@@ -343,7 +343,7 @@ impl Replay {
     }
 
     /// Reads further lines of a candump log whose times have no date. If at least one of ten times is not later than
-    /// the previous one, the times are probably intervals. The recording is then rejected. The intervals are not added
+    /// the previous time, the times are probably intervals. The recording is then rejected. The intervals are not added
     /// up, because times of low resolution look the same.
     fn look_ahead(&mut self, first: u64, wall: Wall) -> Result<(), BusError> {
         let Some((RecordingFormat::Candump, parser)) = &mut self.format else { return Ok(()) };

@@ -1,7 +1,7 @@
 //! Opens stdout, or reports that it was closed when the program started.
 //!
-//! Before `main`, the standard library replaces a closed stdout with `/dev/null`. It also ignores errors of writing to a
-//! closed stdout. So this module checks stdout before the standard library starts.
+//! Before `main`, the standard library replaces a closed stdout with `/dev/null`. It also ignores errors of writing to
+//! a closed stdout. So this module checks stdout before the standard library starts.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -94,7 +94,8 @@ pub struct Stamp {
     pub wall: Wall,
 }
 
-/// The microseconds that the local time of the host is ahead of UTC, `at` microseconds after 1970; 0 if that is unknown.
+/// The microseconds that the local time of the host is ahead of UTC, `at` microseconds after 1970; 0 if that is
+/// unknown.
 #[cfg(unix)]
 #[allow(unsafe_code)]
 pub fn ahead_of_utc(at: i64) -> i64 {

@@ -5,11 +5,12 @@ use crate::canopen::frame::Frame;
 use std::io::{self, BufWriter, Write};
 use std::time::Duration;
 
-/// The longest time that a line stays in the buffer. A trace can thus be read while the program runs, or after a kill.
+/// The longest time that a line stays in the buffer. So a trace can be read while the program runs, or after
+/// it was killed.
 const FLUSH_INTERVAL: Duration = Duration::from_secs(1);
 
-/// A bus that writes a trace, one line per frame: `(1436509052.249713) can0 044#2A366C2BBA`. A file `*.pcapng` is written
-/// in that format.
+/// A bus that writes a trace, one line per frame: `(1436509052.249713) can0 044#2A366C2BBA`. A file `*.pcapng` is
+/// written in that format.
 ///
 /// If writing fails, [`Bus::receive`] returns the error once, between two frames, and the trace ends. The bus keeps
 /// working, so that the caller can clean up.

@@ -61,7 +61,7 @@ impl NmtCommand {
         matches!(self, NmtCommand::ResetNode | NmtCommand::ResetCommunication)
     }
 
-    /// Parses an NMT frame: the command and the node it is for, where `None` means all nodes.
+    /// Parses an NMT frame: the command and its node. `None` means all nodes.
     pub fn parse(frame: &Frame) -> Option<(NmtCommand, Option<NodeId>)> {
         let [specifier, node] = *frame.data() else { return None };
         if frame.id() != CanId::NMT {

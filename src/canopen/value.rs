@@ -84,7 +84,7 @@ impl DataType {
     /// Decodes a value of this type. `bytes` must contain the value and nothing else.
     ///
     /// # Errors
-    /// The type has a fixed size and `bytes` has another one.
+    /// The type has a fixed size, and the size of `bytes` is different.
     pub fn decode(self, bytes: &[u8]) -> Result<Value, WidthError> {
         if let Some(width) = self.width()
             && width != bytes.len()
@@ -117,7 +117,7 @@ fn sign_extend(unsigned: u64, width: u8) -> i64 {
     (unsigned << unused).cast_signed() >> unused
 }
 
-/// Decodes a VISIBLE_STRING. The standard requires ISO 646, but devices send Latin-1, where each byte is a character.
+/// Decodes a VISIBLE_STRING. The standard requires ISO 646, but devices send Latin-1: each byte is a character.
 /// Trailing zeros are removed: an expedited answer has four bytes even if the string is shorter.
 fn latin1(bytes: &[u8]) -> String {
     let end = bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);

@@ -22,9 +22,9 @@ pub struct Model {
     pub dictionary: Dictionary,
     /// Objects whose type the description leaves open; they are read as bytes.
     pub untyped: BTreeSet<ObjectId>,
-    /// The devices that the files are for: one for each file.
+    /// The device of the description, and the device of each EDS file that was merged into it.
     pub made_for: Vec<MadeFor>,
-    /// Warnings about objects, with the index of each.
+    /// Warnings about objects, each with the index of its object.
     pub warnings: Vec<(u16, String)>,
 }
 
@@ -180,7 +180,8 @@ impl Model {
         !self.description.identify.is_empty() && key(self) == key(other)
     }
 
-    /// How specific the description is. A more specific one has priority; the identity is compared first.
+    /// How specific the description is: the number of its identity keys, then the number of other objects to compare. A
+    /// more specific description has priority.
     fn rank(&self) -> (usize, usize) {
         let identify = &self.description.identify;
         (identify.identity_count(), identify.confirm.len())
@@ -238,8 +239,8 @@ pub fn by_name(name: &str) -> Option<Arc<Model>> {
     file(names().position(|other| other == name)?)
 }
 
-/// The description with this vendor-ID and product code, if there is exactly one. Used for devices with no other known
-/// facts.
+/// The description with this vendor-ID and product code, if there is exactly one. It is used for devices of which
+/// nothing else is known.
 pub fn by_identity(vendor: u32, product: u32) -> Option<Arc<Model>> {
     let wanted = (Some(vendor), Some(product));
     let mut fitting = all().filter(|model| {
@@ -254,10 +255,11 @@ pub fn has_vendor(vendor: u32) -> bool {
     built_in().iter().any(|model| model.description.identify.vendor_id == Some(vendor))
 }
 
-/// The objects that must be read before
-/// [`recognise`] can decide. Empty if they are not needed, or if no description can fit. Put the bytes received into [`Traits::answers`].
+/// The objects that must be read before [`recognise`] can decide. Empty if they are not needed, or if no description
+/// can fit. The caller reads them, and adds the received bytes to [`Traits::answers`].
 pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {
-    // Further answers cannot change a decision by identity: only a description with a longer identity would win.
+    // Other descriptions with the same number of identity keys cannot change the decision. Only a description with more
+    // identity keys would have priority.
     let decided = recognise(traits).map_or(0, |model| model.rank().0);
     let open = |model: &&Arc<Model>| model.has_identity(traits) && model.rank().0 > decided;
     let mut objects: Vec<ObjectId> = all()
@@ -270,8 +272,8 @@ pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {
     objects
 }
 
-/// The description that fits a device's answers: one of the user's, else a built-in one. If several fit, the most
-/// specific one is used; if two are equally specific, none.
+/// The description that fits the answers of a device: a description of the user, else a built-in one. If several fit,
+/// the most specific one is used. If two are equally specific, none is used.
 pub fn recognise(traits: &Traits) -> Option<Arc<Model>> {
     let fits = |model: &&Arc<Model>| model.has_identity(traits) && model.is_confirmed(traits);
     let best = |mut fitting: Vec<&Arc<Model>>| {

@@ -161,8 +161,8 @@ impl Unit {
         }
     }
 
-    /// The unit of a symbol: `bar`, `mbar`, `kPa`, `°C` or `degC`, `deg/s`, or a raw code `0x…`. Another case (`PSI`) is
-    /// accepted if it means one unit only.
+    /// The unit of a symbol: `bar`, `mbar`, `kPa`, `°C` or `degC`, `deg/s`, or a raw code `0x…`. Other upper and
+    /// lower case (`PSI`) is accepted if the unit is unambiguous.
     pub fn from_symbol(text: &str) -> Option<Unit> {
         Unit::from_exact(text).or_else(|| match Unit::spellings(text).as_slice() {
             [only] => Unit::from_exact(only),

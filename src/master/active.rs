@@ -174,8 +174,8 @@ impl Active {
         out.push(self.machine.request());
     }
 
-    /// Restarts a transfer after this failure. `false` if a restart is not allowed or would not help. `out` contains the
-    /// abort for the server.
+    /// Restarts a transfer after this failure. `false` if a restart is not allowed or would not help. `out` contains
+    /// the abort for the server.
     pub(super) fn restart(
         &mut self,
         error: TransferError,

@@ -1,14 +1,14 @@
 //! Detects another master on the same SDO channel.
 //!
 //! An SDO server carries out one transfer at a time. If another master starts a segmented transfer during ours, the
-//! server continues with the new one. A segment does not identify its transfer. So our next seven bytes may come from
-//! another object, or from the start of the object.
+//! server continues with the new transfer. A segment does not identify its transfer. So our next seven bytes may come
+//! from another object, or from the start of the object.
 //!
 //! Two kinds of frames show such a transfer. Each received request is foreign, because a bus does not return our own
 //! frames. And the server announces each segmented transfer that it starts.
 //!
-//! In that case our transfer waits until the foreign one has ended, and then restarts. A foreign expedited transfer
-//! between two of our segments is harmless: the server continues ours or aborts it.
+//! In that case our transfer waits until the foreign transfer has ended, and then restarts. A foreign expedited
+//! transfer between two of our segments is harmless: the server continues ours or aborts it.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
@@ -94,7 +94,7 @@ impl ForeignTraffic {
         self.requested
     }
 
-    /// Whether the node answers another master, so that it is not silent.
+    /// Whether the node answers another master, and is therefore not silent.
     pub(super) fn is_served(self) -> bool {
         self.answered
     }

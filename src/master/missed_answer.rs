@@ -32,9 +32,9 @@ pub struct MissedAnswer {
 pub(super) struct MissedAnswers {
     states: BTreeMap<NodeId, NmtState>,
     answered: BTreeSet<NodeId>,
-    /// When the nodes sent their boot-up messages, until their first answer.
+    /// The time of the boot-up message of each node that has not answered since.
     boot_times: BTreeMap<NodeId, Mono>,
-    /// The total time of repeats after boot-up messages that got no answer.
+    /// The total time spent on unanswered repeats after boot-up messages.
     time_without_answer: Duration,
     /// The object of each request without an answer so far, and another frame that was received instead.
     open: BTreeMap<NodeId, (ObjectId, Option<Frame>)>,
@@ -83,9 +83,9 @@ impl MissedAnswers {
         self.time_without_answer += time;
     }
 
-    /// Whether a node started a short time ago and has not answered since. Some devices do not answer for 2 to 3 s after
-    /// their boot-up message.
-    /// `asked_at` is the time of the first request: further boot-up messages do not extend the time limit.
+    /// Whether a node started a short time ago and has not answered since. Some devices do not answer for 2 to 3 s
+    /// after their boot-up message. `asked_at` is the time of the first request: further boot-up messages do not extend
+    /// the time limit.
     pub(super) fn is_starting(&self, node: NodeId, asked_at: Option<Mono>, now: Mono) -> bool {
         let is_recent = |moment: Mono| now.since(moment) < START_TIME;
         let has_started = self.boot_times.get(&node).copied().is_some_and(is_recent);

@@ -165,8 +165,8 @@ impl<'bus> Master<'bus> {
         self.foreign_nmt
     }
 
-    /// Receives only NMT commands, and the SDO channels and the heartbeats of these nodes. On a busy bus, other frames cost time and may
-    /// fill the receive buffer.
+    /// Receives only NMT commands, and the SDO channels and the heartbeats of these nodes. On a busy bus, other frames
+    /// cost time and may fill the receive buffer.
     ///
     /// # Errors
     /// The bus rejects the filters.

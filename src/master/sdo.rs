@@ -38,7 +38,7 @@ struct Node {
     accept_60: bool,
 }
 
-/// The longest delay of an answer. CiA 301 gives no limit; storing takes the longest time.
+/// The longest delay of an answer. CiA 301 states no limit; storing takes the longest time.
 const STALE_LIFETIME: Duration = Duration::from_secs(10);
 
 /// The results of the transfers that have ended.
@@ -339,8 +339,8 @@ impl SdoClient {
         self.nodes.entry(node).or_default().answers.needs_check()
     }
 
-    /// The end of the time in which second answers may arrive. `None` if no node needs this time, or if a transfer is in
-    /// progress.
+    /// The end of the time in which second answers may arrive. `None` if no node needs this time, or if a transfer is
+    /// in progress.
     pub(super) fn second_answer_until(&self) -> Option<Mono> {
         if self.is_busy() {
             return None;

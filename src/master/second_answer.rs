@@ -1,7 +1,7 @@
 //! Detects a second answer to one request: two devices with one node-ID, or a bridge that repeats frames.
 //!
-//! A server answers each request once. Requests of another master and repeated requests also cause further answers, so
-//! such answers are ignored.
+//! A server answers each request once. But a second answer is ignored if another master sent a request, or if the
+//! request was repeated: these requests have their own answers.
 
 use super::Master;
 use super::request::{Operation, SdoError, SdoFailure};
@@ -19,7 +19,7 @@ const FOREIGN_ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 /// The longest wait for a second answer.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
-/// The number of earlier answers whose repetition is recognised.
+/// The number of earlier answers that are kept to recognise their repetition.
 const HISTORY: usize = 16;
 
 /// The reaction if two devices answer with one node-ID.
@@ -49,7 +49,7 @@ impl SecondAnswer {
         multiplexer(self.second.data())
     }
 
-    /// Whether the answers differ, so that they come from two devices.
+    /// Whether the answers differ. They then come from two devices.
     pub fn differs(self) -> bool {
         self.first != self.second
     }
@@ -73,8 +73,8 @@ impl Master<'_> {
 }
 
 impl SdoError {
-    /// The error of a transfer with a node-ID of two devices. It names the request that got two answers, which may be an
-    /// earlier one.
+    /// The error of a transfer if two devices have the node-ID. It contains the request that got two answers. This may
+    /// be an earlier request.
     pub(super) fn two_devices(node: NodeId, object: ObjectId, operation: Operation, failure: SdoFailure) -> SdoError {
         let answers = match &failure {
             SdoFailure::TwoDevices(Some(answers)) | SdoFailure::NotWritten(answers) => Some(*answers),
@@ -99,22 +99,22 @@ pub struct Answers {
     initial: Option<(Frame, Operation)>,
     /// The latest frame that was used.
     latest: Option<Frame>,
-    /// Earlier values of `initial`, the latest one last.
+    /// Earlier values of `initial`, the latest value last.
     history: VecDeque<(Frame, Operation)>,
-    /// Objects whose request was repeated or dropped. More than one answer may come.
+    /// Objects whose request was repeated or dropped. More than one answer may arrive.
     repeated: BTreeSet<ObjectId>,
     foreign_until: Option<Mono>,
     finding: Option<SecondAnswer>,
-    /// When a second answer to the latest request would have arrived.
+    /// Until this time, a second answer to the latest request may arrive.
     wait_until: Option<Mono>,
-    /// Whether the time for a second answer has once passed without such an answer.
+    /// Whether a second answer was once awaited and did not arrive: only one device has this node-ID.
     is_single: bool,
     /// Whether [`Answers::needs_check`] was called.
     is_checked: bool,
 }
 
 impl Answers {
-    /// The two different answers; if there are none, the repeated answer.
+    /// The two different answers, else the answer that arrived twice.
     pub fn finding(&self) -> Option<SecondAnswer> {
         self.finding
     }
@@ -123,8 +123,8 @@ impl Answers {
         self.finding.filter(|finding| finding.differs())
     }
 
-    /// Whether the serial number must be read before the first write. Needed if the node has not answered yet, or if
-    /// its answers arrive twice. `true` only once.
+    /// Whether the serial number must be read before the first write. This is needed if the node has not answered yet,
+    /// or if its answers arrive twice. Only the first call returns `true`.
     pub(super) fn needs_check(&mut self) -> bool {
         let is_first = !std::mem::replace(&mut self.is_checked, true);
         is_first && (self.latest.is_none() || self.finding.is_some())
@@ -144,7 +144,7 @@ impl Answers {
     pub fn on_answer(&mut self, frame: Frame, operation: Operation, asked_at: Option<Mono>, at: Mono) {
         self.latest = Some(frame);
         let Some(asked_at) = asked_at else { return };
-        // The time for a second answer to the previous request is over.
+        // Only one device has this node-ID if no second answer to the previous request arrived in time.
         self.is_single |= self.initial.is_some() && self.wait_until.is_none_or(|until| until <= at);
         self.initial = Some((frame, operation));
         self.history.push_back((frame, operation));
@@ -155,8 +155,9 @@ impl Answers {
         self.wait_until = Some(at + wait);
     }
 
-    /// Whether this frame only repeats the latest one. It is then an earlier segment, or an answer to the previous
-    /// request of the other kind (read or write). An abort has the same form for both kinds.
+    /// Whether this frame repeats the latest frame and so does not belong to the present request. This is certain in
+    /// two cases: in a segmented transfer, where two segments in succession differ, and if the previous request was of
+    /// the other kind (read or write). An abort is the same for both kinds, so it proves nothing.
     pub(super) fn is_repetition(&self, frame: &Frame, operation: Operation, is_in_segments: bool, at: Mono) -> bool {
         let is_abort = frame.data().first() == Some(&0x80);
         let is_other = !is_abort && self.initial.is_some_and(|(_, previous)| previous != operation);
@@ -197,12 +198,12 @@ impl Answers {
         self.history.iter().filter(|(answer, _)| answer == frame).count()
     }
 
-    /// Until when a second answer may arrive; `None` if only one device has this node-ID.
+    /// The time until which a second answer may arrive; `None` if only one device has this node-ID.
     pub(super) fn wait_until(&self) -> Option<Mono> {
         self.wait_until.filter(|_| !self.is_single || self.finding.is_some())
     }
 
-    /// The time until `now` has passed.
+    /// Call this after a wait that ended at `now` without a second answer.
     pub(super) fn on_waited(&mut self, now: Mono) {
         if self.wait_until.is_some_and(|until| until <= now) {
             self.wait_until = None;
@@ -303,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn a_repetition_ends_no_later_transfer() {
+    fn repeated_frame_does_not_end_a_later_transfer() {
         let acknowledge = "585#6017100000000000";
         let log = after(&[(acknowledge, Operation::Write)]);
         assert!(log.is_repetition(&frame(acknowledge), Operation::Read, false, ms(11)));

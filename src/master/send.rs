@@ -104,8 +104,8 @@ impl Outgoing {
         self.queue.retain(|(_, ticket)| *ticket != Some(gone));
     }
 
-    /// Sends all frames that can be sent now, and calls `sent` for each frame of a transfer, with a moment before and one
-    /// after sending. Returns when to try again if frames are left.
+    /// Sends all frames that can be sent now, and calls `sent` for each frame of a transfer, with a moment before and
+    /// one after sending. Returns when to try again if frames are left.
     ///
     /// # Errors
     /// An error of the bus, or a transmit queue that stays full for `queue_timeout` (at least one second). With

@@ -71,7 +71,7 @@ struct MappedValue {
 struct TpdoDecoder {
     node: NodeId,
     number: TpdoNumber,
-    /// Another TPDO with the same COB-ID, so that the sender or the mapping of a frame is unknown.
+    /// Another TPDO with the same COB-ID. The sender or the mapping of a frame is then unknown.
     shared_with: Option<(NodeId, TpdoNumber)>,
     /// Length of the mapping in bytes.
     length: usize,

@@ -28,8 +28,8 @@ impl IntervalTracker {
             let interval = now.since(last);
             let longest = max_gap.or(self.usual.map(|usual| usual * GAP_FACTOR));
             gap = longest.filter(|&longest| interval > longest).map(|_| interval);
-            // For the average, an interval is limited to three usual ones. So one gap does not hide the next gap. If a
-            // sender becomes slower, the average follows within a few messages.
+            // For the average, an interval is limited to three usual intervals. So one gap does not hide the next gap.
+            // If a sender becomes slower, the average follows within a few messages.
             self.usual = Some(match self.usual {
                 Some(usual) => (usual * 7 + interval.min(usual * GAP_FACTOR)) / 8,
                 None => interval,

@@ -30,7 +30,7 @@ pub struct Signal {
     pub unit: Option<Unit>,
     /// The decimal digits (6132h); `None` if they are unknown.
     pub digits: Option<u8>,
-    /// Whether the object with the decimal digits, or with the step, gave no valid answer. Then an integer has no value.
+    /// Whether the decimal digits or the resolution of the signal could not be read. Integers then cannot be scaled.
     pub lacks_scale: bool,
     /// Scaling and status of a signal that does not follow CiA 404.
     pub rules: Rules,
@@ -94,8 +94,8 @@ impl Signal {
 
     /// Whether `object` holds the process value of this signal.
     ///
-    /// True for the described objects. Also true for 6130h (REAL32), 7130h (INTEGER16), 8130h (INTEGER24) and 9130h
-    /// (INTEGER32) with the channel as sub-index.
+    /// True for the objects in the description of the signal. Also true for 6130h (REAL32), 7130h (INTEGER16), 8130h
+    /// (INTEGER24) and 9130h (INTEGER32) with the channel as sub-index.
     pub fn is_value(&self, object: ObjectId) -> bool {
         object == self.value_object.0
             || self.other_objects.contains(&object)
@@ -104,7 +104,7 @@ impl Signal {
                 && PROCESS_VALUES.iter().any(|&(index, _)| index == object.index)
     }
 
-    /// The number of a value: an integer has the decimal digits of the signal. `None` for text, and for an integer whose
+    /// The scaled number: an integer has the decimal digits of the signal. `None` for text, and for an integer whose
     /// scale is unknown.
     pub fn number(&self, value: &Value) -> Option<Number> {
         let is_integer = matches!(value, Value::Integer(_) | Value::Unsigned(_));
@@ -156,9 +156,9 @@ pub struct Tpdo {
 pub struct Layout<'a> {
     /// The node-ID.
     pub node: NodeId,
-    /// The device profile, the family_offset word of 1000h; `None` if it is unknown.
+    /// The device profile, the lower word of 1000h; `None` if it is unknown.
     pub profile: Option<u32>,
-    /// The device description, if the node was recognised or the user named one.
+    /// The device description, if the node was recognised or the user chose a description.
     pub model: Option<&'a Model>,
     /// The signals.
     pub signals: &'a [Signal],
@@ -239,8 +239,8 @@ impl Layout<'_> {
         self.signals.iter().find(|signal| signal.is_value(object))
     }
 
-    /// The signal for which an object is read by its address: it is the process value or the net value of a channel.
-    /// Values with a fixed factor are shown as sent.
+    /// The signal of a process value or net value that the user requested by its address. `None` for a signal with a
+    /// fixed factor: its values are shown as sent.
     pub fn measured_signal(&self, object: ObjectId) -> Option<&Signal> {
         let is_net = object.index & 0xfff == NET;
         let signal = self.value_signal(object).or_else(|| self.signal_of(object).filter(|_| is_net))?;

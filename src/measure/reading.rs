@@ -123,7 +123,8 @@ impl Reading {
         }
     }
 
-    /// The sample for the bytes of a value and, if there are any, its status bits. `None` if the bytes do not fit the type.
+    /// The sample for the bytes of a value and, if there are any, its status bits. `None` if the bytes do not fit the
+    /// type.
     pub fn sample(&self, at: Stamp, bytes: &[u8], status_bits: Option<u64>) -> Option<Sample> {
         let without_value =
             |status, doubt| Sample { at, source: self.source, value: None, status, raw: Raw::new(bytes), doubt };
@@ -241,8 +242,8 @@ fn is_at_end(value: &Value, data_type: DataType) -> bool {
     }
 }
 
-/// Whether an integer is the smallest number of its type, which marks an overload (MH-4: -32768, -2147483648). Use it only for
-/// signals that have this marker.
+/// Whether an integer is the smallest number of its type, which marks an overload (MH-4: -32768, -2147483648). Use it
+/// only for signals that have this marker.
 pub fn is_smallest(value: &Value, data_type: DataType) -> bool {
     match (value, data_type) {
         (Value::Integer(number), DataType::Integer(width)) => {

@@ -82,7 +82,7 @@ pub struct NameError {
 }
 
 impl Error {
-    /// Whether the bus failed or the user pressed Ctrl-C, so that nothing else can be tried.
+    /// Whether the bus failed or the user pressed Ctrl-C. Nothing else can then be tried.
     pub fn is_fatal(&self) -> bool {
         matches!(self, Error::Bus(_) | Error::Interrupted)
     }

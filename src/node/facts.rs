@@ -62,7 +62,7 @@ pub struct Node {
     pub id: NodeId,
     /// The identity that the node reports.
     pub identity: Identity,
-    /// The device description, if the node was recognised or the user named one.
+    /// The device description, if the node was recognised or the user chose a description.
     pub model: Option<Arc<Model>>,
     /// Whether the description was searched for: `model: None` then means an unknown device.
     pub is_identified: bool,

@@ -36,7 +36,7 @@ pub struct Reader<'a, A> {
     failed: BTreeMap<NodeId, SdoError>,
 }
 
-/// The first error and the number of a node's objects without an answer, one after the other.
+/// For each node: the first error, and the number of consecutive objects without an answer.
 type Silences = BTreeMap<NodeId, (SdoError, u32)>;
 
 impl<'a, A: Ask> Reader<'a, A> {
@@ -63,7 +63,7 @@ impl<'a, A: Ask> Reader<'a, A> {
             for (at, result) in open.into_iter().zip(self.master.ask(&asked)?) {
                 let (node, object) = objects[at];
                 match result.as_ref().map_err(|error| &error.failure) {
-                    // This object was not read, because an earlier one got no answer.
+                    // This object was not read, because an earlier read got no answer.
                     Err(SdoFailure::Cancelled) => {
                         rest.push(at);
                         continue;

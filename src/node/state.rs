@@ -1,7 +1,8 @@
 //! NMT states and commands, confirmed if possible.
 //!
-//! A state is confirmed by a boot-up message, a heartbeat, the answer to node guarding, or SDO. A stopped node has no SDO:
-//! if it answered before and does not answer now, it is stopped. An SDO answer proves only that a node is not stopped.
+//! A state is confirmed by a boot-up message, a heartbeat, the answer to node guarding, or SDO. A stopped node has no
+//! SDO: if it answered before and does not answer now, it is stopped. An SDO answer proves only that a node is not
+//! stopped.
 
 use super::error::Error;
 use super::read::read_values;
@@ -246,7 +247,7 @@ fn guard(
     if asked.is_empty() || !master.bus().sends_remote_frames() {
         return Ok(states);
     }
-    // With two masters, each would get an answer with the toggle bit that the other one expects.
+    // With two masters, each would get an answer with the toggle bit that the other master expects.
     let until = master.now() + OTHER_GUARD_TIMEOUT.min(master.timing().timeout);
     let is_known = |watch: &LifeWatch, node| watch.guarded_by_others.contains(node) && watch.lives.contains_key(node);
     watch.wait(master, until, &|watch| asked.iter().all(|node| is_known(watch, node)))?;

@@ -304,7 +304,8 @@ fn read_tpdos<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<
     Ok(())
 }
 
-/// The signals of a description, the channels of CiA 404, or the values of a profile and the contents of the TPDOs.
+/// Finds the signals of each node. The first of these that exists is used: the signals of the description, the channels
+/// of CiA 404, the values of the profile together with the contents of the TPDOs.
 fn find_signals<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let mut unknown = Vec::new();
     let mut others = Vec::new();
@@ -334,13 +335,13 @@ fn find_signals<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Resul
     find_objects(reader, nodes, &others)
 }
 
-/// The process value of each channel. `counts` are the answers of sub-index 0 of [`PROCESS_VALUES`].
+/// The process value of each channel. `counts` are the values of sub-index 0 of [`PROCESS_VALUES`].
 fn channel_values(node: &Node, counts: &[Option<Value>]) -> Vec<ObjectId> {
     let channels = |value: &Option<Value>| unsigned::<u8>(value.as_ref()).unwrap_or(0).min(199);
     if let Some((&(index, _), count)) = PROCESS_VALUES.iter().zip(counts).find(|(_, count)| channels(count) > 0) {
         return (1..=channels(count)).map(|channel| ObjectId::new(index, channel)).collect();
     }
-    // Sub-index 0 may be missing. Objects that a TPDO contains exist.
+    // If sub-index 0 cannot be read, the mapping of the TPDOs shows which channels exist.
     let mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);
     let rank = |object: ObjectId| PROCESS_VALUES.iter().position(|&(index, _)| index == object.index);
     let mut known: Vec<(u8, usize)> = mapped.filter_map(|object| Some((object.sub, rank(object)?))).collect();
@@ -372,7 +373,7 @@ fn find_objects<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node], others: 
 }
 
 fn read_units<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
-    // Node, signal, and the objects with its unit, its digits and its step.
+    // Node, signal, and the objects with the unit, the decimal digits and the resolution of the signal.
     let mut wanted: Vec<(usize, usize, [Option<ObjectId>; 3])> = Vec::new();
     for (at, node) in nodes.iter().enumerate() {
         for (number, signal) in node.signals.iter().enumerate() {

@@ -80,7 +80,7 @@ pub struct Transfer {
     pub outcome: Outcome,
 }
 
-/// What a frame is for the transfers.
+/// How a frame belongs to the transfers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The frame has no COB-ID of an SDO channel.
@@ -225,9 +225,9 @@ impl Transfers {
         self.step(index, received)
     }
 
-    /// Ends the transfers of the node before the one at `index`, whose request is now answered: a server answers in the
-    /// order of the requests. If it `begins` to send segments, it has also ended an earlier segmented transfer. Returns
-    /// the new index.
+    /// Ends the transfers of the node before `index`. The request of the transfer at `index` is now answered, and a
+    /// server answers in the order of the requests. If the server `begins` to send segments, it has also ended an
+    /// earlier segmented transfer. Returns the new index.
     fn end_earlier(&mut self, mut index: usize, begins: bool) -> usize {
         let (node, mut at) = (self.open[index].node, 0);
         while at < index {

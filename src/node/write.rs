@@ -1,7 +1,7 @@
 //! The only way to write an object.
 //!
-//! An expedited download either contains its size (23h, 27h, 2Bh, 2Fh) or not (22h). Some devices accept only one of the
-//! two forms:
+//! An expedited download either contains its size (23h, 27h, 2Bh, 2Fh) or not (22h). Some devices accept only one of
+//! the two forms:
 //! 1. The first request has the form of the device description, else it contains the size.
 //! 2. If the node rejects the command (0504 0001h), the same form is sent once more. The reason may be an unfinished
 //!    transfer of another master. A signature is never sent again, and no write is sent again after foreign SDO
@@ -10,7 +10,8 @@
 //!    form is also rejected, the first abort code is reported.
 //! 4. Before a value is sent without its size, the width of the object is checked. If the object is wider, the node
 //!    would add zero bytes: -5 as INTEGER16 would become 65531 in an INTEGER32.
-//! 5. A signature ("save", "load", "zero", "tara", a number with "set") starts an action. It is sent once and never repeated.
+//! 5. A signature ("save", "load", "zero", "tara", a number with "set") starts an action. It is sent once and never
+//!    repeated.
 //! 6. If no answer comes, a plain value is read back. A signature cannot be read back, so its result is unknown.
 
 use super::Node;

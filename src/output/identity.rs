@@ -26,8 +26,8 @@ pub fn cells(identity: [Option<u32>; 4], model: Option<&Model>) -> [Cell; 5] {
     [code(vendor), Cell::from(name).shown_as(shown), code(product), code(revision), serial.into()]
 }
 
-/// The name of a vendor: from the description of the device, otherwise from a built-in description with this vendor-ID. If
-/// the description does not state the vendor-ID, the built-in one has priority.
+/// The name of a vendor: from the description of the device, otherwise from a built-in description with this vendor-ID.
+/// If the description does not state the vendor-ID, the built-in one has priority.
 pub fn vendor_name(vendor: u32, model: Option<&Model>) -> Option<String> {
     // A description that the user named may be for another device.
     let is_own = |model: &&Model| model.made_for.iter().all(|device| device.fits(Some(vendor), None));

@@ -18,7 +18,8 @@ const PARTS: usize = 20;
 /// From the lowest to the highest value.
 const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// The signals of a node in one line, if it has more than these. On a narrow terminal, half or a quarter of them.
+/// If a node has more signals than this, so many of its signals are printed on one line. On a narrow terminal, half or
+/// a quarter of this number is used.
 const SIGNALS_IN_LINE: usize = 8;
 
 /// What is known about a running recording.
@@ -169,7 +170,7 @@ impl LiveTable {
     }
 }
 
-/// The place of a signal. A signal in another unit replaces the one before.
+/// The place of a signal. A signal in another unit replaces the old entry.
 fn place(signals: &mut Vec<LiveSignal>, source: &Source) -> usize {
     let new = LiveSignal {
         node: source.node.get(),
@@ -277,7 +278,7 @@ fn compact(signals: &[&LiveSignal], now: Mono, in_line: usize) -> Vec<Line> {
     lines
 }
 
-/// The times, the rows, and what was lost, in red if not 0.
+/// The times, the number of rows, and the losses, in red if not 0.
 fn status_line(counts: &LiveCounts) -> Line {
     let plain = |text: String| (text, Style::new());
     let clock = |time: Duration| {

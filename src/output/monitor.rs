@@ -76,7 +76,7 @@ impl Report for Entry {
     }
 }
 
-/// The totals in one line: the number of frames, of each kind, and what was not shown.
+/// The totals in one line: the number of all frames, of the frames of each kind, and of the frames that were not shown.
 pub fn totals(report: &MonitorReport) -> String {
     let frames: u64 = report.frames.values().sum();
     let kinds: Vec<String> =

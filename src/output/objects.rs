@@ -129,7 +129,7 @@ impl<'a> ObjectFacts<'a> {
         head.into_iter().chain(shown).chain([page]).collect()
     }
 
-    /// Whether the description has one entry for both objects, so that they share a line of the table.
+    /// Whether the description has one entry for both objects. They then share a line of the table.
     fn is_alike(&self, other: &ObjectFacts<'_>) -> bool {
         let run = |facts: &ObjectFacts<'_>| facts.described().map(|described| described.at);
         run(self).is_some_and(|at| at.is_run && run(other) == Some(at))

@@ -22,7 +22,7 @@ pub(super) const REDRAWS_PER_SECOND: u8 = 10;
 #[derive(Debug)]
 pub struct Progress {
     multi: MultiProgress,
-    /// All lines in one, so that they are drawn together.
+    /// All lines in one bar. They are then drawn together.
     lines: ProgressBar,
     table: LiveTable,
     color: bool,
@@ -37,7 +37,7 @@ impl Progress {
     /// Live lines, hidden unless `show`.
     pub fn new(show: bool, color: ColorChoice) -> Progress {
         let target = match stderr_size().filter(|_| show) {
-            Some(_) => ProgressDrawTarget::term_like_with_hz(Box::new(Screen::default()), REDRAWS_PER_SECOND),
+            Some(_) => ProgressDrawTarget::term_like_with_hz(Box::new(LineTerminal::default()), REDRAWS_PER_SECOND),
             None => ProgressDrawTarget::hidden(),
         };
         let multi = MultiProgress::with_draw_target(target);
@@ -109,7 +109,7 @@ impl Progress {
 /// The terminal on stderr. Lines end with a line end and not with spaces up to the edge, so that a terminal of another
 /// width does not join them.
 #[derive(Debug, Default)]
-struct Screen {
+struct LineTerminal {
     output: Mutex<ScreenOutput>,
 }
 
@@ -120,7 +120,7 @@ struct ScreenOutput {
     is_line_full: bool,
 }
 
-impl Screen {
+impl LineTerminal {
     fn put(&self, text: &str) -> io::Result<()> {
         let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
         // indicatif fills each line with spaces.
@@ -141,7 +141,7 @@ impl Screen {
     }
 }
 
-impl TermLike for Screen {
+impl TermLike for LineTerminal {
     fn width(&self) -> u16 {
         stderr_size().map_or(80, |(width, _)| u16::try_from(width).unwrap_or(u16::MAX))
     }
@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn lines_end_without_spaces() {
-        let screen = Screen::default();
+        let screen = LineTerminal::default();
         for text in ["first", "   ", "second", " "] {
             screen.put(text).expect("memory");
         }

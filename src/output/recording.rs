@@ -318,7 +318,7 @@ fn gap(at: i64) -> Point {
     Point { at, value: f64::NAN, status: None }
 }
 
-/// Adds the gaps: intervals longer than three usual ones.
+/// Adds the gaps: intervals that are longer than three usual intervals.
 fn mark_gaps(points: &mut Vec<Point>) {
     let Some(start) = points.first().map(|point| point.at) else { return };
     let mut intervals = IntervalTracker::default();

@@ -1,8 +1,7 @@
 //! Reports: the output of a command on stdout, defined once for text, JSON Lines and CSV.
 //!
-//! A command returns values that implement
-//! [`Report`]. Each value is one JSON object. The CSV file and the table have the same columns and cells. Only [`render`]
-//! and [`Stream`] know the formats.
+//! A command returns values that implement [`Report`]. Each value is one JSON object. The CSV file and the table have
+//! the same columns and cells. Only [`render`] and [`Stream`] know the formats.
 //!
 //! Rules for every report:
 //!
@@ -75,7 +74,7 @@ pub struct Column {
     nested: &'static [Column],
 }
 
-/// The columns of a report that extends another one. `SUM` is `N + M`.
+/// The columns of a report that extends another report. `SUM` is `N + M`.
 pub const fn joined<const N: usize, const M: usize, const SUM: usize>(
     first: [Column; N],
     then: [Column; M],

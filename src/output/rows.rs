@@ -1,7 +1,7 @@
 //! The rows of a recording: typed rows, file formats, rotation, and the writing of whole lines.
 //!
-//! [`Rows`] converts samples to typed rows, by layout. A sink formats each row and starts the next file when it is due. A [`LineWriter`]
-//! writes the lines. To add a format, add a file in `format/` and its lines in `format.rs`.
+//! [`Rows`] converts samples to typed rows, by layout. A sink formats each row and starts the next file when it is due.
+//! A [`LineWriter`] writes the lines. To add a format, add a file in `format/` and its lines in `format.rs`.
 
 mod cells;
 mod format;

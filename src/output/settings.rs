@@ -206,7 +206,7 @@ impl Report for MinMax {
         vec![self.now.node.into(), signal, min, max, unit.into(), object, before_min, before_max]
     }
 
-    /// After a reset, the previous values are shown, because the new ones have no meaning yet.
+    /// After a reset, the previous values are shown, because the new values have no meaning yet.
     fn text(all: &[MinMax], out: &mut dyn Write) -> io::Result<()> {
         let row = |report: &MinMax| {
             let extremes = report.before.as_ref().unwrap_or(&report.now);

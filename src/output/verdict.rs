@@ -96,7 +96,8 @@ pub fn values(quantities: &[QuantityValue], values: &[Option<f64>]) -> String {
     quantities.iter().zip(values).map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// A value with the digits of the device, exact, or rounded to [`CALCULATED_DIGITS`].
+/// A value with the decimal digits of the device. If they are unknown, an exact value is printed as it is, and any
+/// other value is rounded to [`CALCULATED_DIGITS`].
 fn number(quantity: &QuantityValue, value: f64) -> String {
     match quantity.digits {
         Some(digits) => format!("{value:.*}", usize::from(digits)),

@@ -8,7 +8,7 @@
 //! retime = false             # whether the program may change the bit rate; default: true
 //! seed = 7                   # seed of the noise; default: 0
 //! record = "truth.csv"       # record of the values sent, in the folder of this file
-//! state = "state.toml"       # keeps what the devices store, and their node-IDs, for the next run
+//! state = "state.toml"       # file with the stored settings and the node-IDs, for the next run
 //!
 //! [[device]]
 //! kind = "mh4"               # a built-in description, or a description file in the folder of this file
@@ -29,14 +29,14 @@
 //! refuse = { "0x17" = 1 }    # always rejected, with this error code: 11h, 13h, 17h
 //! endless_fastscan = true    # answers every fastscan frame in configuration state
 //!
-//! [[device.channel]]         # a measured quantity; missing keys keep their defaults
+//! [[device.channel]]         # a measured quantity; if a key is missing, its default is used
 //! channel = 1
 //! base = 5.0
 //! amplitude = 1.0
 //! period_s = 10.0
 //! noise = 0.0
 //! form = "ramp"              # from base - amplitude to base + amplitude in each period; default: "sine"
-//! csv = "course.csv"         # in place of them: lines of SECONDS,VALUE
+//! csv = "course.csv"         # replaces the keys above: lines of SECONDS,VALUE
 //!
 //! [[device.overload]]
 //! channel = 1
@@ -162,7 +162,7 @@ impl Bench {
         Ok(Bench { clock: file.clock.into(), bit_rate, retime: file.retime, record, state, devices })
     }
 
-    /// Keeps what the devices store in this file, if one is given here.
+    /// Keeps the stored settings of the devices in this file, if it is given.
     pub fn with_state(self, path: Option<PathBuf>) -> Bench {
         Bench { state: path.or(self.state), ..self }
     }
@@ -175,7 +175,7 @@ impl Bench {
     /// The devices, with their memory of the last run and with a recorder if the bench contains `state` and `record`.
     ///
     /// # Errors
-    /// The record cannot be written; the file with the memory is not one, or another process uses it.
+    /// The record cannot be written; the file with the memory has another format, or another process uses it.
     pub fn into_devices(mut self) -> Result<Vec<Device>, BenchError> {
         if let Some(path) = &self.state {
             let file = StateFile::open(path)?;

@@ -14,10 +14,10 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// The version of the file. Another one is an error.
+/// The version of the file. Any other version is an error.
 const VERSION: u32 = 1;
 
-/// What a device keeps without power.
+/// The settings that a device keeps without power.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Stored {
     pub(super) node: Option<NodeId>,
@@ -89,12 +89,12 @@ impl StateFile {
         Ok(StateFile { inner: Arc::new(Mutex::new(Inner { file, devices })) })
     }
 
-    /// What a device has stored in an earlier run.
+    /// The settings that a device has stored in an earlier run.
     pub(super) fn get(&self, kind: &str, serial: u32) -> Option<Stored> {
         self.inner.lock().ok()?.devices.get(&(kind.to_owned(), serial)).cloned()
     }
 
-    /// Writes what a device has stored.
+    /// Writes the stored settings of a device.
     pub(super) fn set(&self, kind: &str, serial: u32, stored: &Stored) -> io::Result<()> {
         let Ok(mut inner) = self.inner.lock() else { return Ok(()) };
         inner.devices.insert((kind.to_owned(), serial), stored.clone());

@@ -55,14 +55,14 @@ struct Watch {
 pub(super) enum Cause {
     /// The SYNC or the event timer of the TPDO.
     Due,
-    /// A SYNC, if the values have changed.
+    /// A SYNC. The TPDO is sent if the values have changed.
     IfChanged,
     /// A remote request. The count of SYNCs continues.
     Requested,
 }
 
 impl Tpdo {
-    /// The TPDOs that a device describes.
+    /// All TPDOs in the object dictionary.
     pub(super) fn all(objects: &Objects, style: PdoStyle) -> Vec<Tpdo> {
         let numbers = (0..512).filter(|number| objects.has_index(0x1800 + number));
         numbers.map(|number| Tpdo::new(number, style)).collect()
@@ -125,7 +125,7 @@ impl Tpdo {
         index == 0x1800 + self.number || index == 0x1a00 + self.number
     }
 
-    /// Restarts: the node is OPERATIONAL, or a parameter was written. This sends nothing.
+    /// Called when the node becomes OPERATIONAL, or when a parameter of the TPDO is written. Sends nothing.
     pub(super) fn start(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         *self = Tpdo::new(self.number, self.style);
         self.timer = self.event_timer(objects).map(|period| now + period);
@@ -143,7 +143,7 @@ impl Tpdo {
         self.plan_look(objects, channels, now);
     }
 
-    /// Stops: the node has left OPERATIONAL.
+    /// Called when the node leaves OPERATIONAL.
     pub(super) fn stop(&mut self) {
         *self = Tpdo::new(self.number, self.style);
     }
@@ -153,7 +153,7 @@ impl Tpdo {
         self.look = self.watches.iter().filter_map(next).min().map(Mono::at);
     }
 
-    /// Handles a SYNC; returns whether to send.
+    /// Handles a SYNC. Returns the cause if the TPDO must be sent.
     pub(super) fn sync(&mut self, objects: &Objects) -> Option<Cause> {
         match self.kind(objects) {
             0 => Some(Cause::IfChanged),
@@ -165,7 +165,7 @@ impl Tpdo {
         }
     }
 
-    /// Handles the time `now`; returns whether event timer or event cause a transmission.
+    /// Handles the time `now`. Returns the cause if the event timer or an event triggers a transmission.
     pub(super) fn wake(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) -> Option<Cause> {
         let mut event = self.held_back.is_some_and(|due| due <= now);
         if self.look.is_some_and(|due| due <= now) {
@@ -192,7 +192,7 @@ impl Tpdo {
         [self.timer, self.held_back, self.look].into_iter().flatten().min()
     }
 
-    /// Records a transmission; `false` if nothing is sent, because nothing changed.
+    /// Records a transmission. Returns `false` if nothing is sent because nothing changed.
     pub(super) fn note(
         &mut self,
         cause: Cause,
@@ -240,7 +240,7 @@ impl Watch {
         })
     }
 
-    /// Whether the value changed by delta, or just crossed a limit outwards.
+    /// Whether the value changed by the delta, or left the range between the limits since the last call.
     fn look(&mut self, objects: &Objects, channels: &mut Channels, time: Duration) -> bool {
         let Some(value) = channels.number(objects, self.object, time) else { return false };
         let mut event = self.delta > 0.0 && (value - self.reference).abs() >= self.delta;
@@ -254,7 +254,7 @@ impl Watch {
     }
 }
 
-/// Bit 31 of a COB-ID: the PDO is not valid.
+/// Whether the PDO is valid: bit 31 of its COB-ID is 0.
 fn is_valid(cob_id: u32) -> bool {
     cob_id & 0x8000_0000 == 0
 }

@@ -56,7 +56,7 @@ impl ZeroTarget {
 pub struct Options {
     /// The value to set to zero. A tare has no limit.
     pub target: ZeroTarget,
-    /// The channel; `None`: the only one.
+    /// The channel; `None` for the only channel.
     pub channel: Option<u8>,
     /// The largest reading that is accepted as zero.
     pub limit: Limit,
@@ -281,7 +281,7 @@ impl<'a> Procedure<'a> {
         Ok(AfterWrite { offsets, after, proof })
     }
 
-    /// The first offset that has changed: its old and new value.
+    /// The old and the new value of the first offset that has changed.
     fn changed_offset<'b>(&'b self, now: &'b [Offset]) -> Option<(&'b Offset, &'b Offset)> {
         let pairs = self.offsets.iter().filter_map(|old| Some((old, now.iter().find(|new| new.object == old.object)?)));
         pairs.into_iter().find(|(old, new)| old.value != new.value)

@@ -35,7 +35,8 @@ pub struct CheckOptions {
     pub skip_unsupported: bool,
     /// The expressions, which must all be satisfied.
     pub expressions: Vec<Expression>,
-    /// The mode and duration of a recording (no duration: until the end of a replayed one). `None`: one reading by SDO.
+    /// The mode and duration of a recording; `None` for one reading by SDO. Without a duration, a replayed recording is
+    /// read to its end.
     pub recording: Option<(Mode, Option<Duration>)>,
     /// Descriptions given by the user.
     pub overrides: Overrides,
@@ -88,7 +89,8 @@ impl CheckReport {
 /// Checks that all verdicts are good.
 ///
 /// # Errors
-/// `check-failed` if an expression is not satisfied. If data is missing: the common failure of all missing data, else `no-answer`.
+/// `check-failed` if an expression is not satisfied. If data is missing: the kind of failure, if it is the same for all
+/// missing data, else `no-answer`.
 pub fn all_satisfied(verdicts: &[Verdict], failures: &[Failure]) -> Result<(), Failure> {
     let failed: Vec<Verdict> = verdicts.iter().filter(|verdict| verdict.outcome == Outcome::Fail).cloned().collect();
     let without = verdicts.iter().filter(|verdict| verdict.outcome == Outcome::NoData).count();

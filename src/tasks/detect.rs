@@ -17,7 +17,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The bit rates of CiA 301 in bit/s, and 100k, which many sensors offer; the most frequent ones first.
+/// The bit rates of CiA 301 in bit/s, and 100k, which many sensors offer. The most frequent bit rates come first.
 pub const RATES: [u32; 9] = [250_000, 125_000, 500_000, 1_000_000, 100_000, 50_000, 20_000, 10_000, 800_000];
 
 /// This many valid frames prove a bit rate.
@@ -49,7 +49,7 @@ pub struct Tried {
     pub frames: u32,
     /// The errors that the controller reported.
     pub errors: u32,
-    /// Whether all requests were sent without an error, so that another node acknowledged them.
+    /// Whether all requests were sent without an error. Another node has then acknowledged them.
     pub acknowledged: bool,
     /// Why the interface cannot be set to this bit rate; `None` if it can.
     pub impossible: Option<String>,

@@ -1,7 +1,8 @@
 //! Why a node sends no measurements.
 //!
 //! [`diagnose`] decides from evidence, in this order: the last frames of the node ([`Heard`]), its present answers
-//! ([`Inquiry`]), and the parameters of the TPDOs with the requested signals. Causes that cannot be distinguished are reported together: see [`Running`].
+//! ([`Inquiry`]), and the parameters of the TPDOs with the requested signals. Causes that cannot be distinguished are
+//! reported together: see [`Running`].
 
 mod inquiry;
 
@@ -99,7 +100,7 @@ pub enum SilenceCause {
 /// Why a TPDO is not sent, by its parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TpdoCause {
-    /// Bit 31 of the COB-ID is set in all TPDOs of the node; reported for the first one.
+    /// Bit 31 of the COB-ID is set in all TPDOs of the node. The first TPDO is reported.
     Disabled,
     /// No object is mapped. The number is 1Axxh:0, if it was read: FEh and FFh mean multiplexed PDOs.
     NothingMapped(Option<u8>),
@@ -153,7 +154,7 @@ pub enum TpdoCause {
 pub struct Heard {
     /// The state of its last heartbeat; `None` after a boot-up.
     pub state: Option<NmtState>,
-    /// The state that the NMT command of another master demands, other than OPERATIONAL.
+    /// The state that the last NMT command of another master demands; `None` if it is OPERATIONAL.
     pub commanded: Option<NmtState>,
     /// Whether the latest heartbeat or boot-up message was a boot-up message.
     pub booted: bool,
@@ -163,13 +164,13 @@ pub struct Heard {
     pub heartbeat_stopped: bool,
     /// The code of its last emergency.
     pub emergency: Option<u16>,
-    /// Whether the node sent TPDOs, and so is operational.
+    /// Whether the node sent TPDOs. It is then operational.
     pub sends_tpdos: bool,
-    /// SYNC messages from other nodes: their number, and the length of the last one.
+    /// The number of SYNC messages from other nodes, and the length of the last message.
     pub syncs: (u64, usize),
     /// The mapped and the received length in bytes of ignored TPDOs.
     pub wrong_length: Option<(usize, usize)>,
-    /// A COB-ID of two TPDOs: of this node and another one, or of this node.
+    /// A COB-ID that two TPDOs share. The second TPDO belongs to the same node or to another node.
     pub shared: Option<(CanId, [(NodeId, TpdoNumber); 2])>,
 }
 
@@ -196,7 +197,7 @@ pub fn diagnose(
 ) -> Silence {
     let heartbeat = heard.state.filter(|_| !heard.heartbeat_stopped).map(|state| (state, Proof::Heartbeat));
     let answers = findings.map(|findings| findings.answers);
-    // A node that answers is not stopped, and one that does not answer may be.
+    // A node that answers is not stopped. A node that does not answer may be stopped.
     let is_possible = |&state: &NmtState| !heard.sends_tpdos && answers != Some(state == NmtState::Stopped);
     let commanded = heard.commanded.filter(is_possible).map(|state| (state, Proof::Command));
     let known = heartbeat.or_else(|| findings.and_then(|findings| findings.state)).or(commanded);
@@ -220,7 +221,7 @@ pub fn diagnose(
     Silence { emergency: heard.emergency, running, ..Silence::of(cause) }
 }
 
-/// Why the received TPDOs give no values.
+/// Why no values are decoded from the received TPDOs.
 fn frames_cause(node: NodeId, heard: &Heard) -> SilenceCause {
     match (heard.shared, heard.wrong_length) {
         (Some((id, [(one, first), (other, second)])), _) if one == other => {
@@ -302,7 +303,7 @@ fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situ
     }
 }
 
-/// Why a TPDO that is sent by its event timer or on change is not sent.
+/// Why a TPDO with event timer or with transmission on change was not sent.
 fn event_cause(node: &Node, tpdo: &Tpdo, findings: &Findings, waited: Duration) -> TpdoCause {
     let inhibit: Option<u16> = findings.unsigned(tpdo.number.communication(3));
     let inhibit = inhibit.filter(|&inhibit| Duration::from_micros(100) * u32::from(inhibit) >= waited);

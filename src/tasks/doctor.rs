@@ -40,7 +40,7 @@ pub struct DoctorOptions {
     pub lss: bool,
     /// The wait after the last request of the scan.
     pub timeout: Duration,
-    /// The number of requests to a node without an answer.
+    /// The number of requests to a node that does not answer.
     pub rounds: u32,
     /// Descriptions chosen by the user.
     pub overrides: Overrides,
@@ -76,7 +76,7 @@ pub enum FindingCause {
     Absent(Vec<NodeId>),
     /// The node sends heartbeats with this state, but does not answer SDO requests.
     OnlyHeartbeat(NmtState),
-    /// The controller reported this fault. The flag is `true` if a node answered, so that the bit rate is right.
+    /// The controller reported this fault. The flag is `true` if a node answered: the bit rate is then right.
     Fault(Fault, bool),
     /// A value has this status.
     Status(Status),

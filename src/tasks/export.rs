@@ -48,7 +48,7 @@ pub struct MessageSignal {
     pub data_type: DataType,
     /// The scaling from the number to the value.
     pub scale: Scale,
-    /// The unit; `None` if it has none or if it is unknown.
+    /// The unit; `None` if the signal has no unit or if the unit is unknown.
     pub unit: Option<Unit>,
 }
 

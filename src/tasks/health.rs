@@ -40,7 +40,7 @@ const ASSUMED_BIT_RATE: u32 = 125_000;
 /// What is measured, and for how long.
 #[derive(Clone, Debug)]
 pub struct HealthOptions {
-    /// The nodes to report; none means every node that sends.
+    /// The nodes to report. If the list is empty, every node that sends is reported.
     pub nodes: Vec<NodeId>,
     /// Whether the answer times of the nodes are measured by reads. If not, nothing is sent.
     pub reads: bool,

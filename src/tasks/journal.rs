@@ -63,7 +63,7 @@ impl Journal for NoJournal {
 pub enum Undone {
     /// The object has its old value again.
     Restored,
-    /// The value differs from the written one: another program changed it, or the device restarted.
+    /// The object does not have the written value: another program changed it, or the device restarted.
     ChangedSince,
     /// Another device has the node-ID now.
     OtherDevice,

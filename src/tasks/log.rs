@@ -50,7 +50,7 @@ use std::time::Duration;
 pub struct LogOptions {
     /// The nodes.
     pub nodes: Vec<NodeId>,
-    /// The signals; none means all.
+    /// The signals; empty for all.
     pub wanted: Vec<Wanted>,
     /// The source of the values.
     pub mode: Mode,
@@ -113,7 +113,8 @@ pub enum LogEvent {
     Back(NodeId),
     /// The length of a TPDO differs from its mapping: mapped and received length in bytes. The TPDO is ignored.
     WrongLength(NodeId, usize, usize),
-    /// A TPDO of the node is always longer than its mapping: mapped and received length in bytes. The mapped bytes are used.
+    /// A TPDO of the node is always longer than its mapping: mapped and received length in bytes. The mapped bytes are
+    /// used.
     LongerTpdo(NodeId, usize, usize),
     /// The heartbeats of the node have this many bytes, not one.
     HeartbeatLength(NodeId, usize),
@@ -131,8 +132,8 @@ pub enum LogEvent {
 
 /// Receives samples and events. `Break` ends the recording.
 pub trait Observer {
-    /// Nodes whose setup could not be read, before [`Observer::begin`]. The other nodes are recorded. A passive recording
-    /// does not call it.
+    /// Nodes whose setup could not be read, before [`Observer::begin`]. The other nodes are recorded. A passive
+    /// recording does not call it.
     fn failed(&mut self, _failures: &[Failure]) {}
 
     /// The nodes to be recorded, before anything is changed. A passive recording does not call it.
@@ -157,7 +158,7 @@ pub trait Observer {
         ControlFlow::Continue(())
     }
 
-    /// Samples that were requested in this cycle. It may be an earlier one than the present cycle.
+    /// Samples that were requested in this cycle. This cycle may be earlier than the present cycle.
     fn polled(&mut self, _cycle: u64, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
         self.samples(samples, sources)
     }

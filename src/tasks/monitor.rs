@@ -22,9 +22,9 @@ use std::time::Duration;
 /// What is shown, and for how long.
 #[derive(Clone, Debug, Default)]
 pub struct MonitorOptions {
-    /// Only these nodes, and messages that do not belong to one node; none means all.
+    /// The nodes to show, besides messages that do not belong to one node; empty for all nodes.
     pub nodes: BTreeSet<NodeId>,
-    /// Only these kinds of messages; none means all.
+    /// The kinds of messages to show; empty for all.
     pub kinds: BTreeSet<FrameKind>,
     /// Whether repetitions are shown: heartbeats without a change, and error frames that repeat the last one.
     pub all: bool,
@@ -45,7 +45,7 @@ pub struct MonitorReport {
     pub length: Duration,
     /// The number of received frames of each kind, shown or not.
     pub frames: BTreeMap<FrameKind, u64>,
-    /// Messages that were not shown because they repeat an earlier one.
+    /// Messages that were not shown because they repeat an earlier message.
     pub repeated: u64,
     /// COB-IDs of TPDOs whose mapping is unknown, and their nodes.
     pub not_decoded: BTreeMap<CanId, NodeId>,

@@ -52,7 +52,7 @@ impl Target {
         value.ok().and_then(|(bits, _)| bits.as_u64()).is_some_and(|bits| bits & u64::from(mask) == u64::from(mask))
     }
 
-    /// The unit of this target, and the unit that `to` means for it.
+    /// The unit of this target, and the unit to convert to: `C` and `F` are degrees if the target is a temperature.
     ///
     /// # Errors
     /// The units do not convert.
@@ -74,7 +74,7 @@ impl Target {
     }
 }
 
-/// The targets of a node: the requested ones, or every signal.
+/// The requested targets of a node, or all its signals.
 ///
 /// # Errors
 /// The device does not have a signal or status.
@@ -146,7 +146,8 @@ fn typed(node: &Node, object: ObjectId, name: &str, reading: Reading) -> Target 
 
 const U8: DataType = DataType::Unsigned(1);
 
-/// The type of a status object: UNSIGNED8 as 6150h, unless a description or an EDS states another one.
+/// The type of a status object: UNSIGNED8 as 6150h, unless a description or an EDS states another
+/// type.
 fn status_type(node: &Node, status: Option<ObjectId>) -> DataType {
     let stated = status.and_then(|object| node.layout().data_type(object));
     stated.filter(|data_type| matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_))).unwrap_or(U8)

@@ -71,8 +71,8 @@ pub fn read(
     Ok(ReadValue { node: node.id, object, name: entry.map(|entry| entry.full_name()), data_type, value, raw, note })
 }
 
-/// The bytes of a value for an object, and their type: `data_type`, else that of the description or the standard, else an
-/// integer as wide as the object.
+/// The bytes of a value for an object, and their type: `data_type`, else that of the description or the standard, else
+/// an integer as wide as the object.
 ///
 /// # Errors
 /// A value that does not fit the type, an unknown type, a failed transfer, bus errors and Ctrl-C.

@@ -9,8 +9,8 @@ use crate::node::Node;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// The number of TPDOs that may arrive in excess if another node sends SYNC. The SYNC before the first TPDO may not have
-/// been received.
+/// The number of TPDOs that may arrive in excess if another node sends SYNC. The SYNC before the first TPDO may not
+/// have been received.
 const FOREIGN_TOLERANCE: u64 = 1;
 
 /// A TPDO of unknown transmission type depends on SYNC if it arrives in pairs at this many SYNC messages in a row.
@@ -29,7 +29,7 @@ pub(super) struct Surplus {
     pub(super) node: NodeId,
     /// The TPDO.
     pub(super) number: TpdoNumber,
-    /// Whether its values differ from those of the previous frame, so that they come from two devices.
+    /// Whether its values differ from those of the previous frame. They then come from two devices.
     pub(super) differs: bool,
     /// Whether this is the first surplus of this kind from this TPDO.
     pub(super) is_new: bool,

@@ -151,7 +151,7 @@ impl Attempt<'_> {
         for &part in parts {
             loop {
                 match self.bind(part)? {
-                    Bound::Held(listener) => {
+                    Bound::Acquired(listener) => {
                         self.held.push(listener);
                         break;
                     }
@@ -197,7 +197,7 @@ impl Attempt<'_> {
             Ok(listener)
         });
         match listener {
-            Ok(listener) => Ok(Bound::Held(listener)),
+            Ok(listener) => Ok(Bound::Acquired(listener)),
             Err(error) if error.kind() == ErrorKind::AddrInUse => Ok(Bound::InUse),
             Err(error) if matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::Unsupported) => {
                 Ok(Bound::Unavailable)
@@ -250,7 +250,7 @@ impl Attempt<'_> {
 
 /// The result of an attempt to bind a name.
 enum Bound {
-    Held(UnixListener),
+    Acquired(UnixListener),
     InUse,
     /// This system does not support such sockets.
     Unavailable,

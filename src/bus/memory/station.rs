@@ -19,8 +19,9 @@ pub trait Station: Any + Send {
     /// The moment of [`Station::next_wake`] was reached.
     fn wake(&mut self, now: Mono, out: &mut Outbox);
 
-    /// When the station must be woken next. After [`Station::wake`] at `now`, this must be later than
-    /// `now`; otherwise time would stop. The value may change only in the other functions of this trait, or through [`super::MemoryBus::stations_mut`].
+    /// When the station must be woken next. After [`Station::wake`] at `now`, this must be later than `now`; otherwise
+    /// time would stop. The value may change only in the other functions of this trait, or through
+    /// [`super::MemoryBus::stations_mut`].
     fn next_wake(&self) -> Option<Mono>;
 
     /// A frame of this station was sent completely at `now`.

@@ -83,7 +83,7 @@ enum Stage {
     Working,
 }
 
-/// The command without an answer so far.
+/// The command that waits for its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Pending {
     Step(Step),
@@ -95,7 +95,7 @@ enum Pending {
 pub(super) struct Slcan {
     /// The bit rate in bit/s and the mode of the channel; `None` if it is closed.
     channel: Option<(u32, Mode)>,
-    /// The bit rate for a channel that is closed.
+    /// The bit rate to use when the channel is opened.
     bit_rate: u32,
     stage: Stage,
     steps: VecDeque<Step>,
@@ -335,10 +335,10 @@ impl Slcan {
     }
 }
 
-/// The end of the sentence about an adapter.
+/// The end of the error message about an adapter without a listen-only mode.
 const NO_LISTEN_ONLY: &str = "is not known to have a listen-only mode";
 
-/// `F04`.
+/// Parses the answer to `F`: `F04`.
 fn flags(text: &str) -> Option<u8> {
     let digits = text.strip_prefix('F').filter(|digits| digits.len() == 2 && !digits.starts_with('+'))?;
     u8::from_str_radix(digits, 16).ok()
@@ -364,7 +364,8 @@ impl Protocol for Slcan {
         });
         self.lines = lines;
         result?;
-        // Called after all answers, because some firmware sends more than one character for an answer.
+        // Some firmware answers with more than one character. So the next command is sent after all received
+        // characters.
         self.advance(now, out)
     }
 

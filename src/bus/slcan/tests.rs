@@ -9,7 +9,7 @@ fn at(mono: Duration) -> Stamp {
 #[derive(Clone, Default)]
 struct Adapter {
     /// Whether the adapter never answers.
-    is_mute: bool,
+    is_silent: bool,
     /// The end of each answer.
     end: &'static str,
     /// Input before this moment is ignored.
@@ -45,7 +45,7 @@ impl Adapter {
                 continue;
             }
             self.busy_until = now + self.busy;
-            if !self.is_mute {
+            if !self.is_silent {
                 answer.extend(self.answer(&command).bytes());
             }
             self.commands.push(command);
@@ -161,8 +161,8 @@ fn channel_is_opened_step_by_step() {
 
 #[test]
 fn mute_adapter_is_opened_and_gets_frames_slowly() {
-    let mute = Adapter { is_mute: true, busy: Duration::from_micros(900), ..Adapter::default() };
-    let mut bench = Bench::opened(mute, 250_000, Some(Mode::Normal)).expect("opened");
+    let silent = Adapter { is_silent: true, busy: Duration::from_micros(900), ..Adapter::default() };
+    let mut bench = Bench::opened(silent, 250_000, Some(Mode::Normal)).expect("opened");
     assert!(bench.now < Duration::from_secs(3), "{:?}", bench.now);
     for number in 0..5 {
         bench.send(&format!("605#{number:02}")).expect("sent");
@@ -179,8 +179,8 @@ fn rates_and_modes_that_are_not_certain_are_refused() {
     let why = error(unknown(), 800_000, Mode::Normal);
     assert!(why.starts_with("the adapter (Vx) is not known to have 800000 bit/s"), "{why}");
     assert_eq!(error(unknown(), 250_000, Mode::ListenOnly), "the adapter (Vx) is not known to have a listen-only mode");
-    let mute = Adapter { is_mute: true, ..Adapter::default() };
-    let why = error(mute, 250_000, Mode::ListenOnly);
+    let silent = Adapter { is_silent: true, ..Adapter::default() };
+    let why = error(silent, 250_000, Mode::ListenOnly);
     assert_eq!(why, "an adapter without a known version is not known to have a listen-only mode");
     let rejecting = Adapter { rejects: vec!["S8"], ..Adapter::lawicel() };
     assert_eq!(error(rejecting, 1_000_000, Mode::Normal), "the adapter (V1013) rejects the bit rate 1000000");

@@ -159,7 +159,7 @@ fn switch(name: &str, link: &Link, up: bool) -> Result<Link, BusError> {
     if now.up == up { Ok(now) } else { Err(unchanged(name, &format!("it did not go {direction}"))) }
 }
 
-/// Whether an actual bit rate is close enough to the requested one.
+/// Whether an actual bit rate is close enough to the requested bit rate.
 fn is_near(actual: u32, bit_rate: u32) -> bool {
     u64::from(actual.abs_diff(bit_rate)) * 1000 <= u64::from(bit_rate) * TOLERANCE
 }

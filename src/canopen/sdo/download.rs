@@ -69,7 +69,7 @@ impl Download {
         Frame::full(CanId::sdo_request(self.node), frame)
     }
 
-    /// Whether the server has answered, so that it needs an abort.
+    /// Whether the server has answered. If the transfer fails, it then needs an abort.
     pub fn has_begun(&self) -> bool {
         self.state != State::Initiated
     }

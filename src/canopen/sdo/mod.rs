@@ -28,7 +28,7 @@ use super::object::ObjectId;
 /// The result of a frame or a time-out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Progress<T> {
-    /// The frame does not belong to this transfer, or repeats an earlier one. Nothing changed.
+    /// The frame does not belong to this transfer, or repeats an earlier frame. Nothing changed.
     NotOurs,
     /// The transfer continues.
     Continue,

@@ -94,7 +94,7 @@ impl Upload {
         Frame::full(CanId::sdo_request(self.node), [0x40, a, b, c, 0, 0, 0, 0])
     }
 
-    /// Whether the server has answered, so that it needs an abort.
+    /// Whether the server has answered. If the transfer fails, it then needs an abort.
     pub fn has_begun(&self) -> bool {
         self.state != State::Initiated
     }

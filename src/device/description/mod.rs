@@ -248,7 +248,7 @@ pub enum Remap {
     /// CiA 301: set bit 31 of the COB-ID, then the number of entries to 0.
     #[default]
     Invalidate,
-    /// Set the number of entries to 0, in PRE-OPERATIONAL; the PDO is empty meanwhile. Bit 31 is not needed.
+    /// In PRE-OPERATIONAL, set the number of entries to 0. Bit 31 is not needed, because the PDO is then empty.
     CountOnly,
 }
 

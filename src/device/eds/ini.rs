@@ -146,7 +146,7 @@ fn is_comment(text: &str) -> bool {
     text.starts_with([';', '#']) || text.starts_with("//")
 }
 
-/// Whether a section contains free text. Its lines give no warnings.
+/// Whether a section contains free text. Its lines cause no warnings.
 fn is_prose(section: &str) -> bool {
     matches!(section, "fileinfo" | "comments")
 }

@@ -8,8 +8,9 @@ const CP1252_80: [char; 32] = [
 
 /// The text of a file, with `\n` at the end of every line.
 ///
-/// CiA 306 allows ISO 646 only. Real files are UTF-8 or UTF-16, with or without byte order mark, or Windows-1252. A file that is not valid UTF-8 is read as Windows-1252. Control characters become U+FFFD, so that a
-/// name cannot move the cursor of a terminal. ^Z and zeros at the end of a file (DOS, a full disk) are removed.
+/// CiA 306 allows ISO 646 only. Real files are UTF-8 or UTF-16, with or without byte order mark, or Windows-1252. A
+/// file that is not valid UTF-8 is read as Windows-1252. Control characters become U+FFFD, so that a name cannot move
+/// the cursor of a terminal. ^Z and zeros at the end of a file (DOS, a full disk) are removed.
 pub(super) fn decode(bytes: &[u8]) -> String {
     let text = match bytes {
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),

@@ -20,8 +20,8 @@ impl<T> Reading<T> {
     }
 }
 
-/// A value; if that fails, the value without a comment after it, or without quotes around it. CiA 306 allows neither, but
-/// real files contain them.
+/// A value; if that fails, the value without a comment after it, or without quotes around it. CiA 306 allows neither,
+/// but real files contain them.
 fn tolerant<T>(text: &str, parse: impl Fn(&str) -> Option<T>) -> Option<T> {
     let plain = |text: &str| parse(text).or_else(|| parse(text.strip_prefix('"')?.strip_suffix('"')?.trim()));
     plain(text).or_else(|| without_comment(text).and_then(plain))

@@ -21,7 +21,7 @@ const GATHERING_TIME: Duration = Duration::from_millis(20);
 /// The measured answer time of the slaves.
 #[derive(Clone, Copy, Debug)]
 struct Pace {
-    /// The slowest recent answer; old ones are forgotten gradually.
+    /// The time of the slowest recent answer. Old answers lose their effect gradually.
     slowest: Duration,
     timeout: Duration,
     /// The shortest time between two frames.
@@ -63,9 +63,9 @@ impl Lss<'_, '_> {
         self.fastscan_beside(&[])
     }
 
-    /// Like [`Lss::fastscan`], but ignores the slaves in `aside`. They are switched to configuration state, where
-    /// slaves do not take part (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that takes part anyway is found
-    /// again.
+    /// Like [`Lss::fastscan`], but ignores the slaves in `aside`. They are switched to configuration state:
+    /// slaves in this state do not take part in fastscan (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that
+    /// takes part anyway is found again.
     ///
     /// # Errors
     /// As [`Lss::fastscan`], or a slave in `aside` does not answer.

@@ -1,8 +1,8 @@
 //! Units in expressions: which values can be compared, and how they are converted to one unit.
 //!
 //! The scales degC, degF and K have different zero points. So a temperature is converted with the offset of the scale,
-//! and a temperature difference without it. Each value has the number of offsets it contains: 1 in a temperature, 0 in
-//! a difference of two. If this number is unknown, the conversion is rejected.
+//! and a temperature difference without it. For each value, the number of its offsets is counted: 1 in a temperature, 0
+//! in a difference of two temperatures. If this number is unknown, the conversion is rejected.
 
 use super::LocatedError;
 use super::formula::Formula;
@@ -12,7 +12,7 @@ use crate::device::unit::Unit;
 /// The number of offsets of the scale that a value contains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Offsets {
-    /// The number of times: 1 in a temperature, 0 in a difference of two.
+    /// The number: 1 in a temperature, 0 in a difference of two temperatures.
     Known(f64),
     /// A number in the expression. The other side decides.
     Literal,
@@ -52,7 +52,7 @@ impl Typed {
         matches!(self.dimension, Dimension::In(_, Offsets::Literal))
     }
 
-    /// Replaces the unit of a number by the one that it means for a value in `other`.
+    /// Replaces `C` and `F` by degrees if `other` is a temperature.
     fn beside(mut self, other: Dimension) -> Typed {
         if let (Dimension::In(unit, Offsets::Literal), Dimension::In(other, _)) = (self.dimension, other) {
             self.dimension = Dimension::In(unit.beside(other), Offsets::Literal);

@@ -59,9 +59,8 @@ impl Evaluator {
 
     /// Finds the signals of the expressions. An expression without a node is evaluated for each of `nodes`.
     ///
-    /// With
-    /// `skip_unsupported`, a node without the signal is skipped if another node has it. An expression that needs a node in `missing`
-    /// has a verdict without data.
+    /// With `skip_unsupported`, a node without the signal is skipped if another node has it. An expression that needs a
+    /// node in `missing` has a verdict without data.
     ///
     /// # Errors
     /// A signal that does not exist, or units that cannot be compared.

@@ -3,7 +3,7 @@
 use super::tree::{Operator, Relation};
 use crate::device::unit::Unit;
 
-/// Calculated values that differ by less than this share of the larger one are equal. This share is larger than
+/// Calculated values are equal if they differ by less than this share of the larger value. This share is larger than
 /// rounding errors, and far below the resolution of any sensor.
 const ROUNDING: f64 = 1e-9;
 

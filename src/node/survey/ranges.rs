@@ -10,7 +10,8 @@ use crate::node::Node;
 use crate::node::read::{Item, Reader};
 
 /// Reads the measuring ranges (6148h, 6149h) if a value depends on them. This is an integer that may be too narrow, or
-/// a described signal without a status. A device with integers may have these objects as integers only (7148h to 9149h).
+/// a described signal without a status. A device with integers may have these objects as integers only (7148h to
+/// 9149h).
 pub(super) fn read_ranges<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     read_family(reader, nodes, 0x6000, |_| true)?;
     for family in [0x9000, 0x8000, 0x7000] {

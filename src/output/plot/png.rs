@@ -163,7 +163,7 @@ impl Image {
     }
 }
 
-/// The first pixel that a line touches, and the one after the last. `None` if it is outside.
+/// The first pixel that a line touches, and the pixel after the last. `None` if it is outside.
 fn bounds(places: impl Iterator<Item = f64> + Clone, radius: f64, end: usize) -> Option<(usize, usize)> {
     let (low, high) = (places.clone().fold(f64::INFINITY, f64::min), places.fold(f64::NEG_INFINITY, f64::max));
     let first = pixels((low - radius - 1.0).max(0.0)).min(end);

@@ -11,7 +11,7 @@ const DAY_US: f64 = 86_400e6;
 /// Days from 1899-12-30, the first day of spreadsheets, to 1970-01-01.
 const DAYS_BEFORE_1970: f64 = 25_569.0;
 
-/// A smaller number is a day of a spreadsheet; a larger one, a number of seconds since 1970.
+/// A smaller number is a day of a spreadsheet. A larger number is a number of seconds since 1970.
 const FEWEST_SECONDS: f64 = 1e7;
 
 /// `2023-11-14T22:13:21`.

@@ -45,7 +45,7 @@ pub(super) enum HeaderPlace {
     NextFile,
     /// The lines go to the current file.
     CurrentFile,
-    /// The current file has the lines, or they come with the first row.
+    /// The lines are not written now: the current file contains them, or they are written with the first row.
     Present,
 }
 

@@ -1,9 +1,9 @@
-//! The memory of a device that lasts between runs, and what a user changes while the simulation runs.
+//! The memory of a device that lasts between runs, and the changes of a user while the simulation runs.
 
 use super::*;
 use crate::sim::state::{StateFile, Stored};
 
-/// Where a device keeps what it has stored.
+/// The file with the stored settings of a device.
 pub(super) struct Remembered {
     file: StateFile,
     last: Stored,
@@ -26,7 +26,7 @@ impl Device {
         self
     }
 
-    /// Writes what was stored since the last call.
+    /// Writes the settings that were stored since the last call.
     pub(super) fn remember(&mut self) {
         let Some(remembered) = &mut self.remembered else { return };
         let now = Stored::of(&self.memory.settings, &self.memory.objects);

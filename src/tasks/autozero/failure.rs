@@ -160,7 +160,7 @@ pub enum AutozeroEffect {
         /// The object.
         object: ObjectId,
     },
-    /// The previous offset, and where to read the present one.
+    /// The previous offset, and the object with the present offset.
     OffsetBefore {
         /// The object and the number; `None` if no offset can be read.
         offset: Option<(ObjectId, Number)>,

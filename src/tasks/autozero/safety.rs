@@ -20,7 +20,7 @@ pub enum Limit {
     Default,
     /// A percentage of the measuring range.
     Percent(f64),
-    /// A value in this unit, or in the present one.
+    /// A value in this unit, or in the present unit of the signal.
     Value(f64, Option<Unit>),
 }
 

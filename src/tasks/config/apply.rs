@@ -198,7 +198,7 @@ impl Work<'_, '_> {
         (id, number(Form::BitRate))
     }
 
-    /// Checks that a new node-ID is free, and that a device with a new bit rate is alone.
+    /// Checks that a new node-ID is free, and that a device with a new bit rate is the only device on the bus.
     fn check_bus(&mut self) -> Result<(), Failure> {
         let own = self.before.node.id;
         let (id, rate) = self.address();

@@ -12,7 +12,7 @@ use std::time::Duration;
 /// The time between two searches.
 const SEARCH_INTERVAL: Duration = Duration::from_secs(1);
 
-/// In how many searches in a row a device must be missing: it may just restart.
+/// A device is unplugged if it is missing in this many searches in succession. In one search it may be restarting.
 const MISSES: u32 = 2;
 
 /// Finds devices that are new on the bus.
@@ -28,7 +28,7 @@ fn is_same(one: &FoundSlave, other: &FoundSlave) -> bool {
     one.node == other.node && one.address == other.address
 }
 
-/// Whether a device has no node-ID, or that of a new device.
+/// Whether a device has no node-ID, or the factory node-ID of its kind.
 fn is_delivered(found: &FoundSlave) -> bool {
     let factory = found.model.as_ref().and_then(|model| model.description.factory.node_id);
     found.node.is_none() || factory == found.node
@@ -47,7 +47,7 @@ impl Arrivals {
         Ok(found.into_iter().filter(|one| !known.iter().any(|other| is_same(one, other))).collect())
     }
 
-    /// Searches once for a device that was set. `true` if it was unplugged.
+    /// Searches once for a device that was configured. `true` if it was unplugged.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.

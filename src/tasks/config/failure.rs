@@ -34,7 +34,7 @@ pub enum ConfigFailure {
         /// The place of the first value.
         place: Place,
     },
-    /// Settings have other values than the written ones.
+    /// Settings do not have the written values.
     NotKept {
         /// Key, value of the file, value of the device.
         settings: Vec<(String, Item, Option<Item>)>,
@@ -46,7 +46,7 @@ pub enum ConfigFailure {
         /// The other nodes.
         nodes: Vec<NodeId>,
     },
-    /// No device, or more than one, has the identity in a row of a table.
+    /// No device or several devices have the identity in a row of a table.
     NotOneDevice {
         /// The serial number.
         serial: u32,

@@ -46,7 +46,7 @@ const DATES: [(&str, [&str; 3]); 2] = [
 /// The objects of a measuring range: start, end, and their unit if it is not that of the signal.
 struct Places {
     signal: usize,
-    /// `None`: the end is the width of the range.
+    /// `None` if the device has only the width of the range. The object of the width is then in `end`.
     start: Option<ObjectId>,
     end: ObjectId,
     unit: Option<ObjectId>,

@@ -9,7 +9,7 @@ use crate::canopen::value::Value;
 use crate::tasks::pdo;
 
 /// The settings of one stage in the order of writing. Guarding is switched off before heartbeat is switched on, and a
-/// lower limit never exceeds the upper one.
+/// lower limit never exceeds the upper limit.
 pub(super) fn sorted(mut group: Vec<Wanted>, now: &Snapshot) -> Vec<Wanted> {
     let number = |wanted: &Wanted, content: &Content| match content {
         Content::Bytes(bytes) => wanted.setting.data_type.decode(bytes).as_ref().ok().and_then(Value::as_f64),
@@ -60,7 +60,7 @@ pub(super) fn tpdo_settings(old: &pdo::Settings, group: &[Wanted]) -> pdo::Setti
 /// Bit 31 of 1014h and bit 30 of 1005h must not be in use while the identifier changes.
 const IN_USE: [(u16, u32, bool); 2] = [(0x1014, 1 << 31, true), (0x1005, 1 << 30, false)];
 
-/// The differing words of COB-ID objects, with the steps to change each one.
+/// The differing words of COB-ID objects, with the steps to change each word.
 pub(super) fn service_words(group: &[Wanted], now: &Snapshot) -> Vec<(ObjectId, Vec<u32>)> {
     let mut words: Vec<(ObjectId, Vec<u32>)> = Vec::new();
     for wanted in group {

@@ -37,7 +37,7 @@ pub struct SignalScale {
     pub unit: Option<Unit>,
     /// The decimal digits; `None` if they are not known yet.
     pub digits: Option<u8>,
-    /// Whether the file sets the unit, so that a bare number is in this unit.
+    /// Whether the file sets the unit. A number without a unit is then in this unit.
     pub is_in_file: bool,
 }
 

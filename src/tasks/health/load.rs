@@ -101,8 +101,8 @@ impl Load {
         if self.end.since(self.start) < WINDOW { self.mean() } else { self.share(self.peak_bits, WINDOW) }
     }
 
-    /// The longest sequence of frames without a pause: its duration and the number of its frames. `None` if the bit rate
-    /// is unknown.
+    /// The longest sequence of frames without a pause: its duration and the number of its frames. `None` if the bit
+    /// rate is unknown.
     pub fn longest_burst(&self) -> Option<(Duration, u64)> {
         self.bit_rate.map(|_| self.longest)
     }

@@ -24,8 +24,8 @@ pub(super) struct Poll {
     answers: Vec<Parts>,
     /// The last answer of each target, if it was an error.
     errors: Vec<Option<SdoError>>,
-    /// Whether a status of each target was received; `None` before the first answer. A status object that does not answer
-    /// the first request is not requested again.
+    /// Whether a status of each target was received; `None` before the first answer. A status object that does not
+    /// answer the first request is not requested again.
     has_status: Vec<Option<bool>>,
 }
 
@@ -72,8 +72,8 @@ impl Poll {
     /// A requested signal cannot be read.
     pub(super) fn set_node(&mut self, node: &Node, wanted: &[Wanted], decoder: &mut Decoder) -> Result<(), Failure> {
         let mut number = 0;
-        // If a node lacks a requested signal, only its other signals are polled. `check_wanted` ensures that at least one
-        // node has the signal.
+        // If a node lacks a requested signal, only its other signals are polled. `check_wanted` ensures that at least
+        // one node has the signal.
         let has = |item: &Wanted| match item {
             Wanted::Signal(name) | Wanted::Status(name) => node.signals.iter().any(|signal| signal.name == *name),
             Wanted::Object(..) | Wanted::Named(..) => true,

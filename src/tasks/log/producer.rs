@@ -15,8 +15,8 @@ pub struct SyncStatistics {
     pub sent: u64,
     /// SYNC messages omitted because their time had passed or the bus did not accept them.
     pub left_out: u64,
-    /// The delay of each SYNC after its nominal time. Nominal times are multiples of the interval since the start, so one
-    /// delay does not shift later times.
+    /// The delay of each SYNC after its nominal time. Nominal times are multiples of the interval since the start, so
+    /// one delay does not shift later times.
     pub delays: Histogram,
 }
 

@@ -68,7 +68,7 @@ pub(super) struct Recording<'o> {
     pub(super) interface: Option<String>,
     /// Whether any frame was received.
     pub(super) has_traffic: bool,
-    /// SYNC messages of other nodes by COB-ID, and the length of the last one.
+    /// For each COB-ID: the number of SYNC messages of other nodes, and the length of the last message.
     pub(super) syncs_received: BTreeMap<CanId, (u64, usize)>,
     /// Whether frames with all COB-IDs are received.
     receives_all: bool,

@@ -19,8 +19,8 @@ pub enum Remark {
     NoRequestedSignal(NodeId),
     /// Two TPDOs, of one node or of two nodes, have this COB-ID. They are ignored.
     SharedCobId(CanId, [(NodeId, TpdoNumber); 2]),
-    /// A valid TPDO is not decoded. The number is 1Axxh:0: FEh and FFh mean multiplexed PDOs; `None` if the mapping could
-    /// not be read.
+    /// A valid TPDO is not decoded. The number is 1Axxh:0: FEh and FFh mean multiplexed PDOs; `None` if the mapping
+    /// could not be read.
     NotDecoded(NodeId, TpdoNumber, Option<u8>),
     /// TPDOs of the node with this COB-ID were ignored, because their mapping is unknown.
     UnknownMapping(NodeId, CanId),

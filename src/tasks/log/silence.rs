@@ -1,4 +1,4 @@
-//! Finds nodes and signals of a recording without values, and the reasons.
+//! Finds the nodes and signals of a recording that sent no values, and the reasons.
 
 use super::recording::Recording;
 use super::{FIRST_SAMPLE_TIMEOUT, LogFailure, LogOptions, Mode};
@@ -13,7 +13,7 @@ use crate::tasks::diagnosis::{Findings, Heard, Inquiry, Silence, SilenceCause, S
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A node without values, or a source without values of a node with other values.
+/// A node without values, or a signal without values although other signals of its node have values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Silent {
     Node(NodeId),
@@ -74,7 +74,7 @@ fn waited(options: &LogOptions) -> Duration {
 }
 
 impl Recording<'_> {
-    /// The nodes without values, and the sources without values of other nodes.
+    /// The nodes without values, and the signals without values of nodes that send other values.
     pub(super) fn silent(&self) -> Vec<Silent> {
         let expected = |node: &&Node| self.is_expected(node.id);
         let mut silent = Vec::new();
@@ -134,7 +134,7 @@ impl Recording<'_> {
         Silence { unknown_cob_ids: self.unknown_cob_ids.iter().copied().collect(), ..silence }
     }
 
-    /// Whether a TPDO contains recorded values of a silent node or source.
+    /// Whether a TPDO contains recorded values of a silent node or signal.
     fn carries(&self, silent: Silent, tpdo: &Tpdo) -> bool {
         let id = tpdo.cob_id.can_id();
         match silent {
@@ -143,7 +143,7 @@ impl Recording<'_> {
         }
     }
 
-    /// A COB-ID of a TPDO with requested values that another TPDO has, too.
+    /// A COB-ID that two TPDOs share, if one of them contains requested values.
     fn shared_cob_id(
         &self,
         node: &Node,
@@ -156,7 +156,7 @@ impl Recording<'_> {
         })
     }
 
-    /// The objects to read from silent nodes. None for polled nodes: their polls show the reason.
+    /// The objects to read from silent nodes. Polled nodes are not asked: the polls already show the reason.
     fn questions(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
         if matches!(self.options.mode, Mode::Poll(_) | Mode::Passive) || !self.link_is_up || self.interface.is_none() {
             return Vec::new();
@@ -181,8 +181,8 @@ impl Recording<'_> {
         }
     }
 
-    /// Reads objects of the silent nodes at the end of a recording. After a failure of the bus, the reasons are only
-    /// less exact.
+    /// Reads objects of the silent nodes at the end of a recording. If the bus fails meanwhile, the reasons are less
+    /// exact, but the recording does not fail.
     pub(super) fn ask_silent_nodes(&mut self, master: &mut Master<'_>) {
         let asked = self.questions();
         if asked.is_empty() || self.is_interrupted() || self.rows() > 0 && self.is_short() {

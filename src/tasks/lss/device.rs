@@ -121,7 +121,8 @@ pub struct Descriptions<'a> {
 }
 
 impl Descriptions<'_> {
-    /// The description of a device: the one that the user named, else by its SDO answers, else by its identity.
+    /// The description of a device: the description that the user chose, else that of its SDO answers, else that of its
+    /// identity.
     ///
     /// # Errors
     /// The named description is for another device. Bus errors and Ctrl-C; the node stops answering.

@@ -70,7 +70,7 @@ pub enum LssEvent {
         /// The error; `None` if the device was found again.
         reason: Option<Reason>,
     },
-    /// The device stores the bit rate before it uses it, so it cannot return to the old one.
+    /// The device stores the bit rate before it uses it, so it cannot return to the old bit rate.
     NoReturn {
         /// The new bit rate in bit/s.
         bit_rate: u32,

@@ -29,7 +29,7 @@ pub struct LssFailure {
 pub enum LssCause {
     /// An LSS service with the device failed.
     Service(Arc<LssError>),
-    /// The description that the user named is for this device, which is another one.
+    /// The description that the user chose is for this other device.
     OtherDescription(MadeFor),
     /// The device has no serial number, so it cannot be distinguished from others.
     NoSerialNumber,

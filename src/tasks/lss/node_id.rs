@@ -175,8 +175,8 @@ fn is_collision(fault: Fault) -> bool {
     matches!(fault, Fault::Protocol | Fault::ErrorPassive | Fault::BusOff)
 }
 
-/// Whether a node-ID is in use: an SDO answer, a heartbeat or a boot-up message. A stopped node without heartbeat cannot
-/// be detected.
+/// Whether a node-ID is in use: an SDO answer, a heartbeat or a boot-up message. A stopped node without heartbeat
+/// cannot be detected.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.

@@ -119,7 +119,7 @@ fn previous(master: &mut Master<'_>, node: NodeId, write: Write) -> Result<Write
     Ok(uploaded.and_then(|uploaded| uploaded.bytes.first().map(|&number| (object, number))))
 }
 
-/// Writes the previous numbers to the objects that may contain the new ones.
+/// Writes the previous numbers to the objects that may contain the new numbers.
 fn revert(
     master: &mut Master<'_>,
     device: &LssDevice,

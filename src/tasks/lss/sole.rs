@@ -71,7 +71,7 @@ pub(super) fn sole_device(
     Ok(device)
 }
 
-/// The only device found by SDO, and evidence of another one.
+/// The only device found by SDO, and evidence of another device.
 fn by_sdo(master: &mut Master<'_>) -> Result<(LssDevice, Option<AnotherSlave>), Failure> {
     let nodes = nodes::on_bus(master)?;
     let (node, mut another) = match nodes[..] {
@@ -105,7 +105,7 @@ fn ask_all(lss: &mut Lss<'_, '_>, known: Option<LssAddress>) -> Result<SlaveAnsw
     }
     let address = <[u32; 4]>::try_from(numbers).ok().map(LssAddress::new);
     let mut answers = SlaveAnswers { address, ..SlaveAnswers::default() };
-    // Equal answers merge on the bus, different ones collide. So slaves with other numbers are searched by
+    // On the bus, equal answers merge and different answers collide. So slaves with other numbers are searched by
     // identification.
     if let Some(address) = address.or(known) {
         match lss.others(&address)? {

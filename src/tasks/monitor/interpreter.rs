@@ -219,7 +219,7 @@ impl Interpreter {
         })
     }
 
-    /// Whether a message repeats an earlier one. Stores the states of the nodes.
+    /// Whether a message repeats an earlier message. Stores the states of the nodes.
     fn is_repeated(&mut self, node: Option<NodeId>, content: &Content, frame: &Frame) -> bool {
         let Some(node) = node else { return false };
         match *content {

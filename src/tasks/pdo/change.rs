@@ -1,4 +1,4 @@
-//! Changes the old settings to the requested ones, and restores the old ones if a step fails.
+//! Writes the requested settings, and restores the old settings if a step fails.
 
 use super::failure::{Incomplete, PdoEffect, PdoFact, PdoFailure, StepError, StepWrite};
 use super::plan;

@@ -293,7 +293,7 @@ pub enum PdoFact {
         /// The groups of 1010h.
         groups: Vec<Group>,
     },
-    /// The object cannot be mapped according to the description. The request was sent anyway.
+    /// According to the description, the object cannot be mapped. The request was sent nevertheless.
     MaybeNotMappable {
         /// The object.
         object: ObjectId,

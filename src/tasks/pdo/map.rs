@@ -191,8 +191,8 @@ fn check(session: &mut Session<'_, '_>, old: &Settings, wanted: &Settings) -> Re
     Ok(())
 }
 
-/// Whether the mapping is read-only according to the description. The access types of EDS files are not reliable, so they
-/// are not used.
+/// Whether the mapping is read-only according to the description. The access types of EDS files are not reliable, so
+/// they are not used.
 fn has_fixed_mapping(node: &Node, number: TpdoNumber) -> bool {
     let described = node.model.as_ref().filter(|model| !model.description.objects.is_empty());
     described.is_some_and(|model| {

@@ -16,7 +16,7 @@ use crate::tasks::read::ReadFailure;
 use crate::tasks::{Failure, Note};
 use std::str::FromStr;
 
-/// The transmission type for the event timer, unless the description has another one.
+/// The transmission type for the event timer, unless the description states another type.
 const TIMER: u8 = 254;
 
 /// The data bits of a classic CAN frame.

@@ -247,7 +247,8 @@ impl<'a> Watcher<'a> {
         }
     }
 
-    /// Handles a TPDO whose length differs from its mapping. After the first longer one, the mapping is read again.
+    /// Handles a TPDO whose length differs from its mapping. After the first longer TPDO, the
+    /// mapping is read again.
     fn on_wrong_length(
         &mut self,
         node: NodeId,

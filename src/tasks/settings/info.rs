@@ -49,7 +49,7 @@ pub struct Info {
     pub produced: Option<Date>,
     /// The manufacturer-specific objects.
     pub own: Vec<Setting>,
-    /// The groups of 1010h, and the settings that it stores.
+    /// The groups of 1010h, and the settings that the device stores.
     pub store: Store,
 }
 

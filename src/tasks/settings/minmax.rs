@@ -71,8 +71,8 @@ fn extremes(
 /// sent once. If no answer comes, the values prove whether the device executed it.
 ///
 /// # Errors
-/// [`SettingsFailure::NoMinMaxReset`], [`SettingsFailure::MinMaxNotReset`]; the device rejects the signature or does not
-/// answer.
+/// [`SettingsFailure::NoMinMaxReset`], [`SettingsFailure::MinMaxNotReset`]; the device rejects the signature or does
+/// not answer.
 pub fn reset(master: &mut Master<'_>, node: &Node) -> Result<Vec<MinMax>, Failure> {
     let before = present(master, node)?;
     let mut all = Vec::new();

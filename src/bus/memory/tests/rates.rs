@@ -119,7 +119,7 @@ fn a_device_at_a_different_bit_rate_receives_nothing_and_makes_the_program_bus_o
         ]
     );
     assert_eq!(received(&bus, 0), 0);
-    // Bus-off lasts until the interface is set up again, whatever the other stations do.
+    // Bus-off lasts until the interface is set up again. The other stations have no influence.
     bus.attach(tuned(Tuning::At(BIT_RATE), &[(2_000_000, "701#00")]));
     assert_eq!(seen(&mut bus, seconds(3)), []);
     bus.stations_mut::<Tuned>().skip(1).for_each(|station| station.tuning = Tuning::Off);

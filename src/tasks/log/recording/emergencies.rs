@@ -94,7 +94,8 @@ impl Emergencies {
         true
     }
 
-    /// An emergency that was repeated, and how often since it was last reported. `at_end` does not wait for the interval.
+    /// An emergency that was repeated, and how often since it was last reported. `at_end` does not wait for the
+    /// interval.
     pub(super) fn next_repeated(&mut self, now: Mono, at_end: bool) -> Option<(NodeId, Emergency, u64)> {
         let is_over = |recent: &Recent| at_end || now.since(recent.reported) >= REPEAT_INTERVAL;
         self.recent.retain(|recent| recent.count > 0 || !is_over(recent));
@@ -103,8 +104,8 @@ impl Emergencies {
         Some((recent.node, recent.emergency, std::mem::take(&mut recent.count)))
     }
 
-    /// The meaning of an emergency code on this node. Also the set bits of its error register, unless the device always
-    /// sends the same register with this code.
+    /// The meaning of an emergency code on this node, and the set bits of its error register. The bits are omitted if
+    /// the device always sends the same register with this code.
     pub(super) fn meaning(&self, node: NodeId, emergency: Emergency) -> String {
         emergency_text(self.models.get(&node).map(|model| &model.description), emergency)
     }
@@ -116,7 +117,7 @@ impl Emergencies {
             let entry = description.emergency(emergency.code).filter(|entry| entry.overload)?;
             return Some(OverloadChange::Begins(entry.channel(emergency.manufacturer)));
         }
-        // The ended error may be a different one.
+        // Another error may have ended. The register then still shows the overload.
         let pending = description.overload_register().zip(emergency.register);
         let is_pending = pending.is_some_and(|(bits, register)| register.0 & bits == bits);
         (!is_pending).then_some(OverloadChange::Ends)

@@ -108,7 +108,7 @@ impl Recording<'_> {
             && !predefined_tpdo(frame).is_some_and(is_of_other)
     }
 
-    /// While nodes send no values, receives frames with all COB-IDs: their TPDOs may have other ones than in 180xh:1.
+    /// Receives frames with all COB-IDs while nodes send no values: the COB-IDs of their TPDOs may differ from 180xh:1.
     pub(super) fn look_for_unknown_tpdos(&mut self, waited: Duration, master: &mut Master<'_>) {
         let is_due = UNKNOWN_TPDO_DELAY <= waited && waited < FIRST_SAMPLE_TIMEOUT;
         let is_needed = is_due
@@ -116,7 +116,7 @@ impl Recording<'_> {
             && self.liveness.nodes().any(|node| !self.liveness.has_sent(node));
         if is_needed != self.receives_all {
             let filters = if is_needed { Filters::All } else { self.filters() };
-            // After a failure of the bus, the reasons are only less exact.
+            // If this fails, the reasons are less exact, but the recording does not fail.
             self.receives_all = master.listen(&filters).is_ok() && is_needed;
         }
     }
@@ -431,7 +431,7 @@ impl Recording<'_> {
         }
     }
 
-    /// Reports, once each, nodes that stopped sending samples and heartbeats that stopped.
+    /// Reports nodes that stopped sending samples, and heartbeats that stopped. Each is reported once.
     pub(super) fn report_losses(&mut self, now: Mono, master: &Master<'_>, observer: &mut dyn Observer) {
         while let Some((node, silence)) = self.liveness.next_silent(now) {
             self.tally.events.silences += 1;

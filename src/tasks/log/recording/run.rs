@@ -90,7 +90,7 @@ impl Recording<'_> {
         let schedule = Schedule::new(start, self.options.duration, master.bus().is_live());
         let mut recorder = Loop { recording: self, schedule, producer: producer.as_mut(), observer };
         let result = wait::run(master, Policy::Record, &mut recorder);
-        // If the reader has closed the output, the recording ends anyway.
+        // The result is not needed: the recording ends here even if the reader has not closed the output.
         let _ = self.take_early(observer);
         self.timestamps = master.bus().timestamps();
         if let Some(producer) = producer {
@@ -198,8 +198,8 @@ impl Recording<'_> {
         }
     }
 
-    /// Handles Ctrl-C. After the first Ctrl-C, frames received before are still recorded. A second one ends
-    /// immediately.
+    /// Handles Ctrl-C. After the first Ctrl-C, frames received before are still recorded. The second Ctrl-C
+    /// ends the recording immediately.
     fn interrupt(&mut self, schedule: &mut Schedule, master: &Master<'_>) -> Result<ControlFlow<()>, Error> {
         let is_second = std::mem::replace(&mut self.interrupted, true);
         if self.tally.rows == 0 && self.early.is_empty() {
