@@ -62,7 +62,7 @@ class OnlyHeartbeat(HalfDead):
 @case("sdo write 5 0x1017 100 --type u16", 1, err="two devices|bridge")
 @case("check 5 'ch1 < 5'", 6, never="ok ")
 @case("store 5", 1, err="two devices|bridge")
-class Twins(Pair):
+class DuplicateId(Pair):
     """Two devices with one node-ID and two serial numbers."""
 
     def second(self, interface):
@@ -73,7 +73,7 @@ class Twins(Pair):
 
 @case("log 5 --sync 100ms --count 4", 6, err="two devices|bridge", never="ok,")
 @case("sdo read 5 0x6130:1 --type r32", 6, err="two devices|bridge")
-class TwinsOfOneIdentity(Pair):
+class DuplicateIdAndIdentity(Pair):
     """Two devices with one node-ID and equal identities; their values differ."""
 
     def second(self, interface):

@@ -58,7 +58,7 @@ class LateName(Device):
         super().upload(key, value)
 
 
-# Report what was received.
+# The received bytes are reported.
 
 @case("sdo write 5 0x1017 500 --type u16")
 @case("sdo read 5 0x1017 --type u16", out="^500$")

@@ -215,7 +215,7 @@ class FullScaleOfAnInput(Device):
         self.map(0x64010110)
 
 
-# A transfer of the wrong length gives no value.
+# If the length of a transfer is wrong, no value is printed.
 
 @case("sdo read 5 0x1008", 6, err="585#", never="MH-N")
 @case("sdo read 5 0x1008 --output {dir}/name", 6)

@@ -69,7 +69,7 @@ const TABLE: &str = "vendor,product,serial,node,timer,note\n0x47,1,1001,51,100ms
 
 const TEMPLATE: &str = "[device]\nkind = \"mh4\"\n[tpdo.1]\nevent-timer = \"{timer}\"\n";
 
-/// Runs `config apply --table t.csv f.toml --prompt` at a terminal, where this text is typed first. `None` if this
+/// Runs `config apply --table t.csv f.toml --prompt` at a terminal. This text is typed first. `None` if this
 /// computer has no program to make a terminal.
 #[allow(clippy::print_stderr, reason = "a skipped test must be visible")]
 fn at_terminal(bench: &Bench, typed: &str, end: bool) -> Option<super::Done> {

@@ -34,7 +34,7 @@ fn missing_bus_is_a_finding() {
     bench.run("doctor 5,6").exit(2);
 }
 
-/// On a bus where no node answers, and for an absent node.
+/// On a bus on which no node answers, and for an absent node.
 #[test]
 fn no_hint_leads_to_another_exit_3() {
     let commands = [

@@ -33,12 +33,12 @@ fn names(failed: &[u8], nodes: &str, command: &str) {
 }
 
 #[test]
-fn all_names_the_node_that_answers_in_part() {
+fn target_all_reports_a_node_that_answers_only_some_requests() {
     COMMANDS.iter().for_each(|command| names(&[5], "all", command));
 }
 
 #[test]
-fn named_nodes_are_named_if_they_fail() {
+fn each_listed_node_that_fails_is_reported() {
     COMMANDS.iter().for_each(|command| names(&[5, 9], "1,5,9", command));
 }
 
@@ -48,7 +48,7 @@ const SENDING: &str = "[[device]]\nkind = \"mh4\"\nnode = 1\nstart = true\n\
                        [[device]]\nkind = \"mh4\"\nnode = 5\nanswers_only = [\"0x1000\"]\n";
 
 #[test]
-fn pdo_watch_shows_the_others_and_names_the_node_that_fails() {
+fn pdo_watch_continues_and_reports_the_node_that_fails() {
     for (nodes, failed) in [("all", &[5][..]), ("1,5,9", &[5, 9])] {
         let done = Bench::described(SENDING).run(&format!("pdo watch {nodes} --duration 1s")).exit(7);
         assert!(done.stdout.contains("pressure"), "{}{}", done.stdout, done.stderr);
@@ -56,13 +56,13 @@ fn pdo_watch_shows_the_others_and_names_the_node_that_fails() {
             assert!(done.stderr.contains(&format!("cangauge: node {node}: ")), "{}", done.stderr);
         }
     }
-    // Nothing received from node 1, and node 9 is absent: both failed alike.
+    // Nothing received from node 1, and node 9 is absent: both failures have the same kind.
     let done = Bench::described(BENCH).run("pdo watch 1,9 --duration 1s").exit(3);
     assert!(done.stderr.contains("no TPDO"), "{}", done.stderr);
 }
 
 #[test]
-fn one_node_that_fails_alone_keeps_its_own_exit_code() {
+fn single_node_that_fails_sets_its_own_exit_code() {
     for command in COMMANDS.iter().filter(|command| !command.starts_with("nmt")) {
         let command = command.replace("NODES", "9");
         let done = Bench::described(BENCH).run_words(&command.split(';').collect::<Vec<_>>());
@@ -71,14 +71,14 @@ fn one_node_that_fails_alone_keeps_its_own_exit_code() {
 }
 
 #[test]
-fn failed_expression_decides_over_a_node_that_answers_in_part() {
+fn failed_expression_sets_the_exit_code_even_if_a_node_fails() {
     let done = Bench::described(BENCH).run_words(&["check", "all", "pressure > 1000 bar"]);
     assert_eq!(done.code, Some(1), "{}{}", done.stdout, done.stderr);
     assert!(done.stdout.contains("no data: node 5: "), "{}", done.stdout);
 }
 
 #[test]
-fn scan_lists_a_node_that_answers_in_part() {
+fn scan_lists_a_node_that_answers_only_some_requests() {
     let done = Bench::described(BENCH).run("scan").exit(0);
     assert!(done.stdout.lines().any(|line| line.trim_start().starts_with("5 ")), "{}", done.stdout);
 }

@@ -1,5 +1,5 @@
-//! Runs the binary on the simulated bus in a cleared environment. Checks stdout, stderr, exit code and, by `--trace`, the
-//! frames. Benches use the virtual clock, so waiting takes no time.
+//! Runs the binary on the simulated bus in a cleared environment. Checks stdout, stderr, exit code and, by `--trace`,
+//! the frames. Benches use the virtual clock, so waiting takes no time.
 
 mod args;
 mod autozero;

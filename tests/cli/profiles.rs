@@ -265,7 +265,7 @@ fn values_by_address_are_read_as_the_signal() {
     // An integer instead of the REAL32 of CiA 404.
     let integer = bench_of(&[("0x6130:1", "i32", "ro", "12345")], &["0x61300120"]);
     check(&integer, "5", "0x6130:1 < 1").exit(1);
-    // The status object says that the value is not valid.
+    // The status object reports that the value is not valid.
     let invalid = bench_of(
         &[("0x6130:1", "r32", "ro", "7.5"), ("0x6140:1", "r32", "ro", "7.5"), ("0x6150:1", "u8", "ro", "1")],
         &["0x61300120", "0x61500108"],

@@ -294,7 +294,7 @@ fn filters() {
         done.stderr
             .starts_with("warning: node 5: it acknowledged the damping, but the filter constant did not change (1)")
     );
-    // 0 is not "no filter" on the MC1609, although one of its tables says so.
+    // 0 is not "no filter" on the MC1609, although one table of its manual states it.
     let done = bench.run("filter 3 ch1 --type none").exit(2);
     assert_eq!(
         done.stderr.lines().next(),

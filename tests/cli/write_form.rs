@@ -1,4 +1,4 @@
-//! Every command sends the form that the description of the device says: a DPS accepts no size (22h).
+//! Every command sends the requests in the form of the description: a DPS accepts no size (22h).
 
 use super::{Bench, Done};
 use std::fs;
@@ -38,7 +38,7 @@ fn nmt_probe_sends_the_described_form() {
     sends_no_size("nmt state 127 --probe").exit(0);
 }
 
-/// An MH-4 whose description says that it accepts no size.
+/// An MH-4 with a description that states: it accepts no size.
 #[test]
 fn lss_by_objects_sends_the_described_form() {
     for line in ["lss set-id 1 3 --via sdo", "lss set-bitrate 1 250k --via sdo"] {

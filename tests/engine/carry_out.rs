@@ -128,7 +128,7 @@ fn target(spec: &Spec, target: &Target) -> lss::Target {
     }
 }
 
-/// Runs the command as the command line does, and sends the remaining frames.
+/// Runs the command as the command line does, and sends the frames that are still in the transmit queue.
 pub(crate) fn carry_out(bus: &mut dyn Bus, spec: &Spec, observed: &mut Observations) -> Result<Claim, Failure> {
     if let Command::Detect { ask, each_ms } = spec.command {
         let found = detect::detect(bus, ask, Duration::from_millis(each_ms), &mut |_| {})?;

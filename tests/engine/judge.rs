@@ -78,7 +78,7 @@ fn ends(run: &Run, violations: &mut Vec<Violation>) {
     }
 }
 
-/// The group with this number.
+/// The group of settings (1010h) with this number.
 pub(crate) fn group(number: u8) -> Group {
     [Group::All, Group::Communication, Group::Application][usize::from(number % 3)]
 }

@@ -1,5 +1,5 @@
-//! Generated scenarios: a seed gives devices, faults, a command and an interruption. Then the test checks the rules that
-//! must always hold. The same seed always gives the same scenario.
+//! Generated scenarios: a seed gives devices, faults, a command and an interruption. Then the test checks the rules
+//! that must always hold. The same seed always gives the same scenario.
 //!
 //! ```text
 //! cargo test --test engine                                        some hundred fixed seeds

@@ -29,34 +29,34 @@ pub(crate) enum Oddity {
     Heartbeat(usize),
     /// TPDOs have this many bytes.
     Pdo(usize),
-    /// It has neither a profile nor a known vendor: nothing states the types of its objects.
-    Stranger,
+    /// It has neither a profile nor a known vendor. The types of its objects are then unknown.
+    Unidentified,
     /// TPDO1 contains its pressure as INTEGER16 with so many digits that it is clipped.
     Clips,
     /// Another device has the same node-ID.
-    Twin,
+    DuplicateId,
     /// It sends no TPDO.
-    Mute(Mute),
+    NoTpdo(TpdoFault),
 }
 
 /// Why a device sends no TPDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Mute {
+pub(crate) enum TpdoFault {
     Disabled,
     OnRequest,
     SlowTimer,
     WaitsForSync,
     FewSyncs,
-    FallsBack,
+    LeavesOperational,
     Stops,
-    /// Stops without heartbeat: node guarding shows the state.
-    StopsUnseen,
-    /// Falls back with the emergency FF00h.
+    /// It stops, and has no heartbeat. Node guarding shows the state.
+    StopsWithoutHeartbeat,
+    /// It leaves OPERATIONAL and sends the emergency FF00h.
     Emergency,
     /// It neither receives nor sends after the start.
-    Dies,
-    /// The same without heartbeat.
-    DiesUnseen,
+    Offline,
+    /// The same, and it has no heartbeat.
+    OfflineWithoutHeartbeat,
     NothingMapped,
     /// Its mapping is that of a multiplexed PDO (1A00h:0 is FEh).
     Multiplexed,
@@ -64,39 +64,39 @@ pub(crate) enum Mute {
     NotSent,
 }
 
-impl Mute {
+impl TpdoFault {
     /// The text that the failure of `log` must contain.
     pub(crate) fn reason(self) -> &'static str {
         match self {
-            Mute::Disabled => "(bit 31 of 1800h:1)",
-            Mute::OnRequest => "is sent on remote request only (1800h:2",
-            Mute::SlowTimer => "is longer (1800h:5 is 60000 ms)",
-            Mute::WaitsForSync => "waits for SYNC, and no node sends SYNC",
-            Mute::FewSyncs => "is sent at every 240th SYNC",
-            Mute::FallsBack => "it is pre-operational again after the start",
-            Mute::Stops => "it is stopped after the start",
-            Mute::StopsUnseen => "it is stopped",
-            Mute::Emergency => "it is pre-operational again after the start, emergency FF00h",
-            Mute::Dies => "its heartbeat stopped",
-            Mute::DiesUnseen => "it does not answer: it is stopped, or has no power or cable",
-            Mute::NothingMapped => "nothing is mapped to TPDO1 (1A00h:0 is 0)",
-            Mute::Multiplexed => "is a multiplexed PDO (1A00h:0 is FEh)",
-            Mute::NotSent => "is due ",
+            TpdoFault::Disabled => "(bit 31 of 1800h:1)",
+            TpdoFault::OnRequest => "is sent on remote request only (1800h:2",
+            TpdoFault::SlowTimer => "is longer (1800h:5 is 60000 ms)",
+            TpdoFault::WaitsForSync => "waits for SYNC, and no node sends SYNC",
+            TpdoFault::FewSyncs => "is sent at every 240th SYNC",
+            TpdoFault::LeavesOperational => "it is pre-operational again after the start",
+            TpdoFault::Stops => "it is stopped after the start",
+            TpdoFault::StopsWithoutHeartbeat => "it is stopped",
+            TpdoFault::Emergency => "it is pre-operational again after the start, emergency FF00h",
+            TpdoFault::Offline => "its heartbeat stopped",
+            TpdoFault::OfflineWithoutHeartbeat => "it does not answer: it is stopped, or has no power or cable",
+            TpdoFault::NothingMapped => "nothing is mapped to TPDO1 (1A00h:0 is 0)",
+            TpdoFault::Multiplexed => "is a multiplexed PDO (1A00h:0 is FEh)",
+            TpdoFault::NotSent => "is due ",
         }
     }
 
-    /// The sub-index of each TPDO, its number of bytes and its value, that have this effect.
+    /// The writes to the parameters of a TPDO that cause this: sub-index, number of bytes, value.
     fn settings(self, device: &mut Device, index: u16) -> Vec<(u8, u8, u32)> {
         match self {
-            Mute::Disabled => {
+            TpdoFault::Disabled => {
                 let bytes = device.value(ObjectId::new(index, 1), Mono::START).unwrap_or_default();
                 let cob_id = bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte));
                 vec![(1, 4, cob_id | 0x8000_0000)]
             }
-            Mute::OnRequest => vec![(2, 1, 253)],
-            Mute::SlowTimer => vec![(2, 1, 254), (5, 2, 60_000)],
-            Mute::WaitsForSync | Mute::NotSent => vec![(2, 1, 1), (5, 2, 0)],
-            Mute::FewSyncs => vec![(2, 1, 240), (5, 2, 0)],
+            TpdoFault::OnRequest => vec![(2, 1, 253)],
+            TpdoFault::SlowTimer => vec![(2, 1, 254), (5, 2, 60_000)],
+            TpdoFault::WaitsForSync | TpdoFault::NotSent => vec![(2, 1, 1), (5, 2, 0)],
+            TpdoFault::FewSyncs => vec![(2, 1, 240), (5, 2, 0)],
             _ => Vec::new(),
         }
     }
@@ -120,10 +120,10 @@ impl Mute {
 }
 
 impl Oddity {
-    /// Changes the device after power-on. Returns whether it then has the oddity.
+    /// Changes the device after power-on. Returns whether it then has the deviation.
     pub(crate) fn power_on(self, device: &mut Device, now: Mono) -> bool {
         match (self, device.node()) {
-            (Oddity::Mute(mute), Some(node)) => mute.set_up(device, now, node.get()),
+            (Oddity::NoTpdo(fault), Some(node)) => fault.set_up(device, now, node.get()),
             (Oddity::Clips, Some(node)) => clip(device, now, node.get()),
             _ => true,
         }
@@ -141,18 +141,20 @@ impl Oddity {
 
     /// Whether the device does not send a frame.
     pub(crate) fn drops(self, frame: &Frame) -> bool {
-        matches!(self, Oddity::Mute(Mute::Multiplexed | Mute::NothingMapped | Mute::NotSent)) && is_tpdo(frame)
+        matches!(self, Oddity::NoTpdo(TpdoFault::Multiplexed | TpdoFault::NothingMapped | TpdoFault::NotSent))
+            && is_tpdo(frame)
     }
 
-    /// The NMT command that the device gives itself when it is operational, and the emergency that it sends then.
+    /// The NMT command that the device behaves as if it received when it is operational, and the emergency it sends
+    /// then.
     pub(crate) fn own_command(self, node: NodeId) -> Option<(Frame, Option<Frame>)> {
         let specifier = match self {
-            Oddity::Mute(Mute::FallsBack | Mute::Emergency) => NmtCommand::EnterPreOperational,
-            Oddity::Mute(Mute::Stops | Mute::StopsUnseen) => NmtCommand::Stop,
+            Oddity::NoTpdo(TpdoFault::LeavesOperational | TpdoFault::Emergency) => NmtCommand::EnterPreOperational,
+            Oddity::NoTpdo(TpdoFault::Stops | TpdoFault::StopsWithoutHeartbeat) => NmtCommand::Stop,
             _ => return None,
         };
         let emergency = Frame::full(CanId::emergency(node), [0x00, 0xff, 0x81, 0, 0, 0, 0, 0]);
-        let sends = self == Oddity::Mute(Mute::Emergency);
+        let sends = self == Oddity::NoTpdo(TpdoFault::Emergency);
         Some((Frame::pair(CanId::NMT, specifier.specifier(), node.get()), sends.then_some(emergency)))
     }
 
@@ -163,14 +165,18 @@ impl Oddity {
         match (self, id.sdo_response_node(), data.as_mut_slice()) {
             (Oddity::WrongToggle, Some(_), [first, ..]) if *first >> 5 == 0 => *first |= 0x10,
             (Oddity::IndexZero, Some(_), [0x60, rest @ ..]) => rest.fill(0),
-            (Oddity::Stranger, Some(_), [_, 0x00, 0x10, 0, value @ ..]) => value.fill(0),
-            (Oddity::Stranger, Some(_), [_, 0x18, 0x10, 1, value @ ..]) => value.copy_from_slice(&[0x77, 0, 0, 0x7f]),
-            (Oddity::Mute(mute @ (Mute::Multiplexed | Mute::NothingMapped)), Some(_), answer) => match answer {
-                [0x40..=0x4f, 0..=0x0f, 0x1a, 0, count, ..] => {
-                    *count = if mute == Mute::Multiplexed { 0xfe } else { 0 };
+            (Oddity::Unidentified, Some(_), [_, 0x00, 0x10, 0, value @ ..]) => value.fill(0),
+            (Oddity::Unidentified, Some(_), [_, 0x18, 0x10, 1, value @ ..]) => {
+                value.copy_from_slice(&[0x77, 0, 0, 0x7f])
+            }
+            (Oddity::NoTpdo(fault @ (TpdoFault::Multiplexed | TpdoFault::NothingMapped)), Some(_), answer) => {
+                match answer {
+                    [0x40..=0x4f, 0..=0x0f, 0x1a, 0, count, ..] => {
+                        *count = if fault == TpdoFault::Multiplexed { 0xfe } else { 0 };
+                    }
+                    _ => return frame,
                 }
-                _ => return frame,
-            },
+            }
             (Oddity::Heartbeat(length), None, _) if id.heartbeat_node().is_some() => data.resize(length, 0),
             (Oddity::Pdo(length), None, _) if is_tpdo(&frame) => data.resize(length, 0),
             _ => return frame,
@@ -178,15 +184,25 @@ impl Oddity {
         Frame::new(id, &data).unwrap_or(frame)
     }
 
-    /// Whether the device ends in a state of its own.
+    /// Whether the device changes its NMT state itself.
     pub(crate) fn has_own_state(self) -> bool {
-        let mutes = [Mute::FallsBack, Mute::Emergency, Mute::Stops, Mute::StopsUnseen, Mute::Dies, Mute::DiesUnseen];
-        mutes.into_iter().any(|mute| self == Oddity::Mute(mute))
+        let faults = [
+            TpdoFault::LeavesOperational,
+            TpdoFault::Emergency,
+            TpdoFault::Stops,
+            TpdoFault::StopsWithoutHeartbeat,
+            TpdoFault::Offline,
+            TpdoFault::OfflineWithoutHeartbeat,
+        ];
+        faults.into_iter().any(|fault| self == Oddity::NoTpdo(fault))
     }
 
-    /// Whether the program can use the device like one without the oddity.
+    /// Whether the deviation has no effect on the results of the program.
     pub(crate) fn is_harmless(self) -> bool {
-        !matches!(self, Oddity::Stranger | Oddity::Clips | Oddity::Twin | Oddity::Mute(_) | Oddity::Pdo(0..=7))
+        !matches!(
+            self,
+            Oddity::Unidentified | Oddity::Clips | Oddity::DuplicateId | Oddity::NoTpdo(_) | Oddity::Pdo(0..=7)
+        )
     }
 }
 
@@ -215,7 +231,7 @@ fn is_tpdo(frame: &Frame) -> bool {
 }
 
 impl Spec {
-    /// Makes one device odd, and chooses a command that meets the oddity.
+    /// Gives one device a deviation, and chooses a command that is affected by it.
     pub(crate) fn make_odd(&mut self, random: &mut Random) {
         let fits = |device: &&mut DeviceSpec| {
             device.node.is_some() && model(device.kind).dictionary.get(ObjectId::new(0x1800, 1)).is_some()
@@ -225,9 +241,10 @@ impl Spec {
         let oddity = oddity(random);
         device.oddity = Some(oddity);
         device.start = false;
-        if matches!(oddity, Oddity::Heartbeat(_) | Oddity::Mute(_)) {
-            let unseen = matches!(oddity, Oddity::Mute(Mute::StopsUnseen | Mute::DiesUnseen));
-            device.heartbeat_ms = (!unseen).then_some(100);
+        if matches!(oddity, Oddity::Heartbeat(_) | Oddity::NoTpdo(_)) {
+            let has_no_heartbeat =
+                matches!(oddity, Oddity::NoTpdo(TpdoFault::StopsWithoutHeartbeat | TpdoFault::OfflineWithoutHeartbeat));
+            device.heartbeat_ms = (!has_no_heartbeat).then_some(100);
         }
         self.timeout_ms = 100;
         (self.others, self.faults, self.interrupts, self.kill) = Default::default();
@@ -242,7 +259,7 @@ impl Spec {
         if oddity == Oddity::Clips {
             self.devices[odd].kind = "mh4";
         }
-        if oddity == Oddity::Twin {
+        if oddity == Oddity::DuplicateId {
             let kind = if random.percent(50) { self.devices[odd].kind } else { *random.pick(&["mh4", "dps", "d20"]) };
             let serial = self.devices[odd].serial + 50;
             self.devices.push(DeviceSpec { kind, serial, oddity: None, ..self.devices[odd].clone() });
@@ -251,25 +268,25 @@ impl Spec {
 }
 
 fn oddity(random: &mut Random) -> Oddity {
-    let mutes = [
-        Mute::Disabled,
-        Mute::OnRequest,
-        Mute::SlowTimer,
-        Mute::WaitsForSync,
-        Mute::FewSyncs,
-        Mute::FallsBack,
-        Mute::Stops,
-        Mute::StopsUnseen,
-        Mute::Emergency,
-        Mute::Dies,
-        Mute::DiesUnseen,
-        Mute::NothingMapped,
-        Mute::Multiplexed,
-        Mute::NotSent,
+    let faults = [
+        TpdoFault::Disabled,
+        TpdoFault::OnRequest,
+        TpdoFault::SlowTimer,
+        TpdoFault::WaitsForSync,
+        TpdoFault::FewSyncs,
+        TpdoFault::LeavesOperational,
+        TpdoFault::Stops,
+        TpdoFault::StopsWithoutHeartbeat,
+        TpdoFault::Emergency,
+        TpdoFault::Offline,
+        TpdoFault::OfflineWithoutHeartbeat,
+        TpdoFault::NothingMapped,
+        TpdoFault::Multiplexed,
+        TpdoFault::NotSent,
     ];
     match random.within(0..=13) {
         11 => Oddity::Clips,
-        12 | 13 => Oddity::Twin,
+        12 | 13 => Oddity::DuplicateId,
         0 => Oddity::Silent(*random.pick(&[0x1008, 0x1009, 0x100a, 0x1018])),
         1 => Oddity::WrongToggle,
         2 => Oddity::Twice,
@@ -277,12 +294,12 @@ fn oddity(random: &mut Random) -> Oddity {
         4 => Oddity::Heartbeat(*random.pick(&[2, 3, 8])),
         5 => Oddity::Pdo(8),
         6 => Oddity::Pdo(*random.pick(&[0, 1])),
-        7 => Oddity::Stranger,
-        _ => Oddity::Mute(*random.pick(&mutes)),
+        7 => Oddity::Unidentified,
+        _ => Oddity::NoTpdo(*random.pick(&faults)),
     }
 }
 
-/// A command that meets the oddity.
+/// A command that is affected by the deviation.
 fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
     let log = |sync_ms, poll_ms| Command::Log {
         nodes: vec![node],
@@ -302,7 +319,7 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
         log(None, Some(100)),
     ];
     let own = match oddity {
-        Oddity::Silent(_) | Oddity::WrongToggle | Oddity::Stranger => of_values.to_vec(),
+        Oddity::Silent(_) | Oddity::WrongToggle | Oddity::Unidentified => of_values.to_vec(),
         Oddity::Twice => [
             of_values.to_vec(),
             vec![
@@ -326,7 +343,7 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
                 excuse: false,
             },
         ],
-        Oddity::Twin => [
+        Oddity::DuplicateId => [
             of_values.to_vec(),
             vec![
                 Command::SdoRead { node, object: ObjectId::new(0x1018, 4), how },
@@ -353,8 +370,8 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
                 log(Some(50), None),
             ]
         }
-        Oddity::Mute(Mute::WaitsForSync | Mute::SlowTimer) => vec![log(None, None)],
-        Oddity::Mute(_) | Oddity::Pdo(_) => vec![log(Some(50), None)],
+        Oddity::NoTpdo(TpdoFault::WaitsForSync | TpdoFault::SlowTimer) => vec![log(None, None)],
+        Oddity::NoTpdo(_) | Oddity::Pdo(_) => vec![log(Some(50), None)],
     };
     random.pick(&own).clone()
 }

@@ -1,6 +1,6 @@
-//! The participants on the bus: devices with faults, which record what they sent, and others.
+//! The participants on the bus: devices with faults, which record the frames they sent, and other participants.
 
-use crate::odd::{Mute, Oddity};
+use crate::odd::{Oddity, TpdoFault};
 use crate::random::Random;
 use crate::spec::{Act, DeviceFault, DeviceSpec};
 use cangauge::bus::Mono;
@@ -231,7 +231,7 @@ impl Station for FaultyDevice {
         if let (Some(oddity), Some(node), Some(State::Operational), CanId::NMT) =
             (self.oddity, self.device.node(), self.device.state(), frame.id())
         {
-            if matches!(oddity, Oddity::Mute(Mute::Dies | Mute::DiesUnseen)) {
+            if matches!(oddity, Oddity::NoTpdo(TpdoFault::Offline | TpdoFault::OfflineWithoutHeartbeat)) {
                 out.clear();
                 self.hangs.push((now, ms(1_000_000)));
             }

@@ -1,4 +1,4 @@
-//! Reads the files of `src` with `syn` and collects what the checks need: paths, macros, strings, functions.
+//! Reads the files of `src` with `syn` and collects the facts for the checks: paths, macros, strings, functions.
 
 use proc_macro2::{TokenStream, TokenTree};
 use std::fs;

@@ -182,7 +182,7 @@ def read(cangauge, directory):
 
 
 def python_master_reads_simulated_devices(cangauge, directory):
-    """python-canopen reads all four simulated devices; they contain what they send."""
+    """python-canopen reads all four simulated devices; their objects contain the values that they send."""
     record = os.path.join(directory, "truth.csv")
     bench = os.path.join(directory, "bench.toml")
     with open(bench, "w", encoding="ascii") as file:

@@ -250,7 +250,7 @@ def full_queue(cangauge, directory, here, there):
             assert "transmit queue is full" in result.err and "acknowledge" in result.err, result
 
 
-def nobody_acknowledges(cangauge, directory, here, there):
+def log_survives_frames_without_acknowledgement(cangauge, directory, here, there):
     """The cable is unplugged for a while: log reports it and continues afterwards."""
     with devices(there, directory, "10:real32", sync=1) as record:
         with cangauge.running("log", 10, "--sync", "20ms", directory=directory, bus=here) as log:
@@ -309,4 +309,4 @@ def link_lost(cangauge, directory, here, there):
 CHECKS = [garbage_while_recording, garbage_while_sending_sync, garbage_while_polling, garbage_while_listening, second_master,
           heavy_traffic]
 # These need two interfaces that are the ends of one bus.
-PAIR_CHECKS = [full_queue, nobody_acknowledges, link_lost]
+PAIR_CHECKS = [full_queue, log_survives_frames_without_acknowledgement, link_lost]

@@ -26,8 +26,8 @@ def network(interface):
 
 
 def asked(interface, work):
-    """Reads from node 5 with python-canopen. Each call opens a connection: an open one would accept answers to
-    cangauge as its own."""
+    """Reads from node 5 with python-canopen. Each call opens a connection, because a connection that stays open would
+    take answers for cangauge as its own answers."""
     with network(interface) as bus:
         node = bus.add_node(5, remote_device({}))
         node.sdo.RESPONSE_TIMEOUT = GIVE_UP

@@ -43,16 +43,17 @@ FAILURES = {1, 3, 4, 5, 6, 7}
 
 
 class Lossy(Relay):
-    """A relay that disturbs this percentage of the frames. The faults of each node are kept until they are taken."""
+    """A relay that disturbs this percentage of the frames. The faults of each node are kept until a worker reads
+    them."""
 
     def __init__(self, here, there, percent, kinds, seed):
         self.percent, self.kinds, self.rng = percent, kinds, random.Random(seed)
-        self.faults_of, self.calm_nodes, self.counts = collections.defaultdict(list), set(), collections.Counter()
+        self.faults_of, self.undisturbed_nodes, self.counts = collections.defaultdict(list), set(), collections.Counter()
         super().__init__(here, there)
 
     def _pass(self, direction, identifier, data):
         node = data[1] & 0x7F if identifier == 0 and data and len(data) > 1 else identifier & 0x7F
-        is_disturbed = node not in self.calm_nodes and self.rng.random() * 100 < self.percent
+        is_disturbed = node not in self.undisturbed_nodes and self.rng.random() * 100 < self.percent
         kind, at, sent = self.rng.choice(self.kinds) if is_disturbed else None, time.monotonic(), data
         if kind == "flip" and data:
             place, bit = self.rng.randrange(len(data)), 1 << self.rng.randrange(8)
@@ -70,7 +71,7 @@ class Lossy(Relay):
 
 
 def is_data(direction, identifier, data, sent):
-    """Whether the flipped bit is in a byte that no length, address or CRC protects."""
+    """Whether the flipped bit is in a data byte that is not protected by a CRC."""
     place = next(at for at, pair in enumerate(zip(data, sent)) if pair[0] != pair[1])
     if identifier & 0x780 not in (0x580, 0x600):
         return True
@@ -80,7 +81,7 @@ def is_data(direction, identifier, data, sent):
 
 
 class Operation:
-    """A command line, and what must be true after exit code 0: a function of the run that returns a complaint."""
+    """A command line. After exit code 0, `truth` checks the run and returns an error text or None."""
 
     def __init__(self, words, truth, is_verified=False):
         self.words, self.truth, self.is_verified = [str(word) for word in words], truth, is_verified
@@ -131,14 +132,14 @@ class Worker(threading.Thread):
         # A delayed frame would disturb the next command.
         time.sleep(LONGEST_DELAY)
         if done.returncode or complaints:
-            relay.calm_nodes.add(self.node)
+            relay.undisturbed_nodes.add(self.node)
             again = self.command(operation, *PATIENT)
             if again.returncode == 3 and self.restarts():
                 self.test.results[name, "restarted device"] += 1
                 again = self.command(operation, *PATIENT)
             if again.returncode or (false := operation.truth(again)):
                 complaints.append(f"again, calm: exit {again.returncode} {again.stdout}{again.stderr}{false if not again.returncode else ''}")
-            relay.calm_nodes.discard(self.node)
+            relay.undisturbed_nodes.discard(self.node)
             if left := self.left():
                 complaints.append(f"left behind: {left}")
         for complaint in complaints:
@@ -333,7 +334,7 @@ class Blocks(Worker):
         self.store = Store(Cangauge(self.test.binary, self.test.there), self.test.folder, "durand").__enter__()
 
     def restarts(self):
-        """After a changed request durand may stay in a block upload that was not requested."""
+        """After a corrupted request, durand may stay in a block upload that was not requested."""
         self.store.kill()
         self.start_store()
         return True

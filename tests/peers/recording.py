@@ -84,7 +84,7 @@ def on_sync(cangauge, directory):
         rows = measured(result.rows())
         begins(rows, record())
         assert len(rows) == 90
-        # Without SYNC no TPDO is sent, and the message says why.
+        # Without SYNC, no TPDO is sent, and the message contains the reason.
         silent = cangauge.run("log", 10, "--duration", "500ms", exit=3)
         assert silent.out == "" and "SYNC" in silent.err and "--sync" in silent.err, silent
     with devices(cangauge.interface, directory, *ALL, sync=3) as record:

@@ -31,7 +31,8 @@ impl Case {
         Case { bench: bench.to_owned(), ..Case::default() }
     }
 
-    /// An MH-4 with node-ID 5 that enters OPERATIONAL by itself and sends each TPDO every 100 ms, with these other values.
+    /// An MH-4 with node-ID 5 that enters OPERATIONAL by itself and sends each TPDO every 100 ms, with these other
+    /// values.
     fn sending(set: &str) -> Case {
         let timers = ["\"0x1800:2\" = 254", "\"0x1800:5\" = 100", "\"0x1801:5\" = 100"];
         let timers = timers.iter().filter(|timer| !set.contains(timer.split(' ').next().unwrap_or_default()));

@@ -25,20 +25,20 @@ const SERIAL: ObjectId = ObjectId::new(0x1018, 4);
 const HEARTBEAT: ObjectId = ObjectId::new(0x1017, 0);
 
 /// A device that does not answer the requests for some objects.
-pub(super) struct Mute {
+pub(super) struct PartlySilent {
     device: Device,
     silent: Vec<u16>,
     silent_object: Option<ObjectId>,
 }
 
-impl Mute {
-    pub(super) fn new(kind: &str, silent: &[u16]) -> Mute {
+impl PartlySilent {
+    pub(super) fn new(kind: &str, silent: &[u16]) -> PartlySilent {
         let device = Device::new(Setup::new(by_name(kind).expect("a kind"), node())).expect("a device");
-        Mute { device, silent: silent.to_vec(), silent_object: None }
+        PartlySilent { device, silent: silent.to_vec(), silent_object: None }
     }
 }
 
-impl Station for Mute {
+impl Station for PartlySilent {
     fn power_on(&mut self, now: Mono, out: &mut Outbox) {
         self.device.power_on(now, out);
     }
@@ -67,7 +67,7 @@ impl Station for Mute {
 /// Runs `work` with a device that does not answer for some objects.
 fn with_mute<T>(kind: &str, silent: &[u16], work: impl FnOnce(&mut Master<'_>) -> T) -> T {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
-    bus.attach(Mute::new(kind, silent));
+    bus.attach(PartlySilent::new(kind, silent));
     work(&mut Master::new(&mut bus, Timing::default()))
 }
 
@@ -261,7 +261,7 @@ fn differing_answers_are_no_value_in_any_transfer() {
     assert!(matches!(error.failure, SdoFailure::TwoDevices(_)), "{error}");
 }
 
-/// The identity of a device that answers 1000h, vendor, product, revision and name, except as `odd` says.
+/// The identity of a device that answers 1000h, vendor, product, revision and name, except for the steps in `odd`.
 fn identity_with(odd: &[Step]) -> Result<Vec<Node>, Error> {
     let steps: [Step; 7] = [
         ("605#40001000", &["585#4300100094010200"]),
@@ -360,7 +360,7 @@ fn pages_show_the_objects_that_answer() {
     let timer = ObjectId::new(0x1800, 5);
     for kind in ["mh4", "dps"] {
         let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
-        bus.attach(Mute { silent_object: Some(timer), ..Mute::new(kind, &[]) });
+        bus.attach(PartlySilent { silent_object: Some(timer), ..PartlySilent::new(kind, &[]) });
         let mut master = Master::new(&mut bus, Timing::default());
         let tpdos = show(&mut master, node(), None, &Overrides::new()).expect("the others answer");
         assert!(!tpdos[0].settings.mapping.is_empty() && tpdos[0].settings.event_timer_ms.is_none(), "{kind}");

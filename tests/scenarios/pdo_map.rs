@@ -1,5 +1,5 @@
-//! `pdo map` with a fault at each frame that it sends. Afterwards the device has its old mapping or the new one, and the
-//! report says which.
+//! `pdo map` with a fault at each frame that it sends. Afterwards the device has its old mapping or the new mapping,
+//! and the report is correct.
 
 use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::bus::{Bus, BusError, Event, Mono, Received};
@@ -467,7 +467,7 @@ fn the_right_steps_in_the_right_order() {
     assert_eq!(writes(&CASES[1], false), count_only);
     let started: Vec<&str> = ["000#8005"].into_iter().chain(count_only).chain(["000#0105"]).collect();
     assert_eq!(writes(&CASES[1], true), started);
-    // What is set already is not written.
+    // A parameter that already has the requested value is not written.
     let bus = |case: &Case| {
         let mut bus = case.bus(false);
         let first = map(

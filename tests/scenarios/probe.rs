@@ -41,7 +41,8 @@ fn after_probe_with(before: i64, interrupts: &[u64]) -> (Vec<u8>, bool) {
 
 #[test]
 fn ctrl_c_at_any_time_restores_the_heartbeat() {
-    // A request and its answer take 42 ms. A second answer is awaited once, for 20 ms. After the heartbeat, the probe cannot be interrupted any more.
+    // A request and its answer take 42 ms. A second answer is awaited once, for 20 ms. After the heartbeat, the probe
+    // cannot be interrupted any more.
     for at in 1..200 {
         assert_eq!(after_probe(&[at]), (vec![0, 0], at < 162), "interrupted at {at} ms");
         assert_eq!(after_probe(&[at, at + 9, at + 30]).0, [0, 0], "three times from {at} ms");

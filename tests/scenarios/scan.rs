@@ -1,6 +1,6 @@
 //! The duration of a scan, and the nodes that it finds.
 
-use super::odd_answers::Mute;
+use super::odd_answers::PartlySilent;
 use cangauge::bus::Bus;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
@@ -58,7 +58,7 @@ fn state_comes_from_the_heartbeat() {
 fn node_without_answer_for_1000h_is_found() {
     for nodes in [ids([5]), ids(1..=127)] {
         let mut bus = MemoryBus::new(Clock::Virtual);
-        bus.attach(Mute::new("mh4", &[0x1000]));
+        bus.attach(PartlySilent::new("mh4", &[0x1000]));
         let (found, _) = scanned(&mut bus, &nodes, WAIT);
         let names: Vec<_> = found.iter().map(|found| found.device.identity.name.as_deref()).collect();
         assert_eq!(names, [Some("MH-4-CAN")]);

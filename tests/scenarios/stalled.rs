@@ -1,5 +1,5 @@
-//! A program that did not run for some time (Ctrl-Z, a suspended laptop, a busy host). It reads the frames that the kernel
-//! kept, and does not send the SYNCs that it missed.
+//! A program that did not run for some time (Ctrl-Z, a suspended laptop, a busy host). It reads the frames that the
+//! kernel kept, and does not send the SYNCs that it missed.
 
 use super::Kept;
 use super::answers::Slow;

@@ -25,7 +25,7 @@ fn node() -> NodeId {
     NodeId::new(5).expect("a node-ID")
 }
 
-/// A server that has an interrupted transfer in progress: it rejects the first request, whatever it is.
+/// A server with an interrupted transfer: it rejects the first request of any kind.
 struct Interrupted {
     rejections: u32,
 }

@@ -106,7 +106,7 @@ fn an_interface_is_one_claim_under_each_of_its_names() {
         second.wait().unwrap();
         assert_eq!(line, format!("{}; waiting for it to end\n", in_use_by(&first)), "{bus}");
     }
-    // Only this option continues beside the holder.
+    // Only with this option, the command continues although the nodes are locked.
     let note = format!("{}; continuing (--ignore-lock)\n", in_use_by(&first));
     cangauge(&format!("sdo read 5 0x1018:1 --ignore-lock -b {}", can.name)).is(0, "71\n", &note);
     run("kill", &["-INT", &first.id().to_string()]);

@@ -98,7 +98,7 @@ fn all_there(spec: &Spec) -> bool {
     !spec.command.is_lss() && named(spec).is_subset(&there)
 }
 
-/// TPDOs that wait for a trigger make no rows; a device with a long latency exceeds a short time-out.
+/// TPDOs that wait for a trigger cause no rows. A device with a long latency exceeds a short time-out.
 fn may_be_silent(spec: &Spec) -> bool {
     matches!(spec.command, Command::Log { .. } | Command::Check { .. } | Command::PdoWatch { .. })
         || spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)

@@ -1,4 +1,4 @@
-//! The claims of a successful command are true, and last if it says so.
+//! The results that a successful command reports are true. Results that it reports as stored last after power off.
 
 use super::rows::answers;
 use super::*;
@@ -198,7 +198,7 @@ pub(super) fn mapped_otherwise(station: &mut FaultyDevice, settings: &Settings, 
     })
 }
 
-/// The last value that was written to each object, if the object keeps what is written.
+/// The last value that was written to each object, if the object keeps a written value.
 pub(super) fn last_writes(spec: &Spec, run: &mut Run, violations: &mut Vec<Violation>) {
     let resets = matches!(
         spec.command,

@@ -21,7 +21,7 @@ pub(super) fn killed(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
             }
         }
     }
-    // A device that has its new node-ID or bit rate is no longer where the same command looks for it.
+    // A device that has its new node-ID or bit rate is no longer found by the same command.
     let moves = matches!(spec.command, Command::Assign { .. } | Command::LssActivate { .. } | Command::Detect { .. });
     let whole = Spec { kill: None, ..spec.clone() };
     if moves || !whole.is_clean() {

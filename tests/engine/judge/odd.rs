@@ -1,15 +1,15 @@
-//! An odd device gives no wrong value, no false reason, and no failure that is not necessary.
+//! A device with a deviation causes no wrong value, no false reason and no unnecessary failure.
 
 use super::*;
-use crate::odd::{Mute, Oddity};
+use crate::odd::{Oddity, TpdoFault};
 use cangauge::canopen::frame::Frame;
 use cangauge::output::failure::ErrorMessage;
 
 /// Compares the result with the oddity of the device.
 pub(super) fn odd(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
-    let twin = spec.devices.iter().find(|device| device.oddity == Some(Oddity::Twin));
-    if let Some(twin) = twin.filter(|_| spec.shares_node_ids()) {
-        twins(twin.node.unwrap_or_default(), run, violations);
+    let duplicate = spec.devices.iter().find(|device| device.oddity == Some(Oddity::DuplicateId));
+    if let Some(duplicate) = duplicate.filter(|_| spec.shares_node_ids()) {
+        duplicate_id(duplicate.node.unwrap_or_default(), run, violations);
     }
     let odd = spec.devices.iter().find_map(|device| Some((device.node?, device.oddity?)));
     let Some((node, oddity)) = odd.filter(|_| !spec.shares_node_ids()) else { return };
@@ -18,7 +18,7 @@ pub(super) fn odd(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
         return;
     }
     match oddity {
-        Oddity::Mute(mute) => reason(run, mute.reason(), mute, violations),
+        Oddity::NoTpdo(fault) => reason(run, fault.reason(), fault, violations),
         Oddity::Pdo(0..=7) => {
             if let Some(row) = run.observed.rows.first() {
                 violations.push(("odd: no value from a short TPDO", row.clone()));
@@ -34,7 +34,7 @@ pub(super) fn odd(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
                 violations.push(("odd: no value of a clipped integer", "the check is satisfied".to_owned()));
             }
         }
-        Oddity::Stranger => {
+        Oddity::Unidentified => {
             let is_known = |row: &&String| {
                 let cells: Vec<&str> = row.split(',').collect();
                 cells[1] == node.to_string() && !cells[3].is_empty()
@@ -51,14 +51,14 @@ pub(super) fn odd(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
 }
 
 /// Two devices with one node-ID: no value of either, and no write.
-fn twins(node: u8, run: &Run, violations: &mut Vec<Violation>) {
+fn duplicate_id(node: u8, run: &Run, violations: &mut Vec<Violation>) {
     let has_value = |row: &&String| {
         let cells: Vec<&str> = row.split(',').collect();
         cells[1] == node.to_string() && !cells[3].is_empty()
     };
     let row = run.observed.rows.iter().find(has_value);
     violations.extend(row.map(|row| ("odd: no value of two devices", row.clone())));
-    // Answers that collide arrive later, or never: a device may be bus-off meanwhile.
+    // After a collision, an answer arrives later or never, because a device may then be bus-off.
     let sent = run.bus.bus.inner().inner().stations::<FaultyDevice>().flat_map(|station| &station.sent);
     let answers: Vec<_> = sent
         .filter(|(at, frame)| *at <= run.ended && frame.id().sdo_response_node().is_some_and(|from| from.get() == node))
@@ -89,7 +89,7 @@ fn twins(node: u8, run: &Run, violations: &mut Vec<Violation>) {
 }
 
 /// The reason for the silence is the real one.
-fn reason(run: &Run, expected: &str, mute: Mute, violations: &mut Vec<Violation>) {
+fn reason(run: &Run, expected: &str, fault: TpdoFault, violations: &mut Vec<Violation>) {
     let said = match &run.result {
         Err(failure) => ErrorMessage::of(failure).message,
         Ok(_) if run.observed.rows.is_empty() => "success".to_owned(),
@@ -97,7 +97,7 @@ fn reason(run: &Run, expected: &str, mute: Mute, violations: &mut Vec<Violation>
         Ok(_) => return,
     };
     if !said.contains(expected) {
-        violations.push(("odd: the reason for the silence", format!("{mute:?}: {said}")));
+        violations.push(("odd: the reason for the silence", format!("{fault:?}: {said}")));
     }
 }
 

@@ -70,7 +70,7 @@ fn begins(frame: &Frame) -> Option<ObjectId> {
     begins.then(|| ObjectId::from_multiplexer([data[1], data[2], data[3]]))
 }
 
-/// If the failure says "no answer": a request without an answer exists.
+/// If the failure is "no answer", there is a request without an answer.
 fn was_silent(spec: &Spec, run: &Run, failure: &Failure, violations: &mut Vec<Violation>) {
     let (Some(node), Some(object)) = (failure.node, failure.object) else { return };
     let message = ErrorMessage::of(failure).message;
@@ -117,7 +117,7 @@ fn is_full(fault: &Fault) -> bool {
     matches!(fault, Fault::QueueFull(_) | Fault::Full { .. })
 }
 
-/// If the failure says "refused": a device refused.
+/// If the failure is "refused", a device has rejected a request.
 fn was_refused(run: &Run, failure: &Failure, violations: &mut Vec<Violation>) {
     let refuses = |frame: &Frame| match (failure.abort(), failure.node, frame.data()) {
         (Some(code), Some(node), [0x80, rest @ ..]) => {

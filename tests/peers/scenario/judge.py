@@ -1,4 +1,4 @@
-"""The rules that hold for each run, whatever faults occurred."""
+"""The rules that hold for each run with any faults."""
 
 import re
 

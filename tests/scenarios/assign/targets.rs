@@ -359,7 +359,7 @@ fn assignment_by_manufacturer_objects() {
 
 #[test]
 fn objects_that_need_a_store_are_not_written_without_one() {
-    // MH-4: effective "after 1010h and a reset". An old HYDAC stores what is written.
+    // MH-4: effective "after 1010h and a reset". An old HYDAC stores the written values.
     for (kind, device, why) in [
         ("mh4", None, "after they are stored (0x1010:1)"),
         ("hydac", None, "after they are stored (0x1010:4)"),

@@ -176,7 +176,8 @@ fn several_slaves_in_configuration_state_are_detected() {
         assert_eq!((serial.is_one(), vendor.is_one(), id.is_one()), (false, false, false), "{latency}");
         assert_eq!((vendor.answers, id.answers), (vec![0x362], vec![Some(node(5))]));
     }
-    // Simultaneous answers merge into one frame if they are equal; otherwise there is an error frame, then both are sent.
+    // Simultaneous answers merge into one frame if they are equal; otherwise there is an error frame, then both are
+    // sent.
     let (serial, vendor, _) = all(&mut bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5)])).unwrap();
     assert_eq!((serial.is_one(), vendor.is_one()), (false, true));
     // Two slaves executed a service for one slave: an error.
