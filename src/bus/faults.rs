@@ -43,7 +43,7 @@ pub struct Faulty<B> {
     received: u64,
     /// Received frames to deliver, in order of their time.
     held: VecDeque<Received>,
-    /// The last reported state of the interface.
+    /// Whether the interface was up in the last report.
     is_up: bool,
     is_off: bool,
     /// Frames that wait in a controller that is bus-off.

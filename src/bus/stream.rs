@@ -110,7 +110,7 @@ pub(super) struct StreamBus<P: Protocol> {
     interrupts: Interrupts,
     opened: Instant,
     filters: Filters,
-    /// The last reported state of the bus.
+    /// Whether the bus was up in the last report.
     is_up: bool,
     /// Why the last connection failed.
     failure: Option<String>,

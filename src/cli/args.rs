@@ -53,7 +53,7 @@ pub enum Nodes {
 }
 
 impl Nodes {
-    /// The claim of these nodes.
+    /// The nodes to lock.
     pub(super) fn claim(&self) -> Claim {
         match self {
             Nodes::All => Claim::every_node(),

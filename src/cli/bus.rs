@@ -77,7 +77,7 @@ struct Detect {
 }
 
 impl BusCommand {
-    /// No claim: other cangauges may use all nodes.
+    /// No node is locked: other cangauge processes may use all nodes.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nothing
     }

@@ -70,7 +70,7 @@ impl ValueEnum for Action {
 }
 
 impl Completions {
-    /// No claim: other cangauges may use all nodes.
+    /// No node is locked: other cangauge processes may use all nodes.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nothing
     }

@@ -99,7 +99,7 @@ pub(crate) struct Log {
     /// Report longer intervals as gaps [default: 3 times the usual interval]
     #[arg(long, value_name = "DUR")]
     max_gap: Option<Duration>,
-    /// Exit with 1 at the end if this expression is not satisfied: 'pressure in 9..11 bar' (see cangauge check --help)
+    /// Exit with 1 at the end if this expression is not satisfied: 'pressure in 9..11 bar' (see check --help)
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     expect: Vec<Expression>,
     /// Plot the values at the end, on stderr (see cangauge plot)

@@ -24,7 +24,7 @@ use std::str::FromStr;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Time zone:
-Times are in the time zone of this computer. This command uses another time zone:
+Times are in the time zone of this computer. For another time zone, type:
   TZ=UTC cangauge plot run.csv
 
 Examples:

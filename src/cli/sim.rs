@@ -38,7 +38,7 @@ pub(crate) struct Sim {
 }
 
 impl Sim {
-    /// No claim: other cangauges may use all nodes.
+    /// No node is locked: other cangauge processes may use all nodes.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nothing
     }

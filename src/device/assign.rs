@@ -25,7 +25,7 @@ pub struct AssignEntry {
     pub store: Option<ObjectId>,
     /// When the new values take effect.
     pub applies: Applies,
-    /// No document confirms this method: it is used only if the user names it.
+    /// Whether no document confirms this method. It is then used only if the user chooses it.
     pub unverified: bool,
     /// Page or table of the manual.
     pub page: String,

@@ -24,7 +24,7 @@ pub(super) struct Active {
     pub(super) ticket: Ticket,
     pub(super) request: Request,
     pub(super) machine: Machine,
-    /// Set when our last frame was sent. Other traffic never extends it.
+    /// The end of the wait for an answer. It is set when our last frame was sent. Other traffic never extends it.
     pub(super) deadline: Option<Mono>,
     /// The number of our frames that still wait to be sent.
     pub(super) unsent: usize,
@@ -40,7 +40,7 @@ pub(super) struct Active {
     pub(super) foreign: ForeignTraffic,
     /// The transfer of the caller. It waits for a barrier read, which makes sure that no stale answer is pending.
     pub(super) deferred: Option<(Ticket, Request)>,
-    /// Another master wrote the same object. The acknowledgements of both writes are equal.
+    /// Whether another master wrote the same object. The acknowledgements of both writes are equal.
     pub(super) ambiguous: bool,
     /// The bytes of a first read whose length is doubtful. The object is read once more.
     pub(super) doubtful: Option<Vec<u8>>,

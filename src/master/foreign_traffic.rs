@@ -21,15 +21,15 @@ const IDLE_TIMEOUT: Duration = Duration::from_millis(50);
 /// The foreign traffic on the channel during one transfer of ours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct ForeignTraffic {
-    /// Any foreign frame was received.
+    /// Whether any foreign frame was received.
     seen: bool,
-    /// A request of another master was received.
+    /// Whether a request of another master was received.
     requested: bool,
-    /// The node answered it.
+    /// Whether the node answered a request of another master.
     answered: bool,
-    /// A segmented or block transfer was seen.
+    /// Whether a segmented or block transfer was seen.
     in_segments: bool,
-    /// A block transfer was seen.
+    /// Whether a block transfer was seen.
     in_blocks: bool,
     /// When our transfer first backed off.
     since: Option<Mono>,
@@ -123,7 +123,8 @@ impl ForeignTraffic {
             }
     }
 
-    /// Makes our transfer wait for the foreign one. `false` if our transfer has already waited for `limit`.
+    /// Makes our transfer wait for the end of the foreign transfer. `false` if our transfer has already waited for
+    /// `limit`.
     pub(super) fn back_off(&mut self, now: Mono, limit: Duration) -> bool {
         let since = *self.since.get_or_insert(now);
         let others = ForeignTraffic { seen: false, in_segments: false, ..*self };

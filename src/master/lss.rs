@@ -47,7 +47,7 @@ enum Until {
 pub struct Gathered<T> {
     /// The different answers, in the order of arrival.
     pub answers: Vec<T>,
-    /// More than one slave answered: the answers differ, or there were more answers than requests.
+    /// Whether more than one slave answered: the answers differ, or there were more answers than requests.
     pub crowded: bool,
     /// Faults during the exchange. Slaves that send different answers at the same time cause them.
     pub faults: Vec<Fault>,
@@ -74,7 +74,7 @@ pub enum Others {
 /// The LSS services of a master.
 pub struct Lss<'master, 'bus> {
     master: &'master mut Master<'bus>,
-    /// A slave may be in configuration state.
+    /// Whether a slave may be in configuration state.
     is_configuring: bool,
     boot_ups: BTreeMap<NodeId, Stamp>,
     faults: Vec<Fault>,

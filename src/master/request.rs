@@ -34,7 +34,7 @@ pub struct Request {
     pub(super) blocks: Blocks,
     /// The limit for the size of a read object in bytes.
     limit: usize,
-    /// The device rejected block transfer during this request.
+    /// Whether the device rejected block transfer during this request.
     pub(super) refused_blocks: bool,
     /// Whether a length other than the announced one is always a failure.
     pub(super) is_exact: bool,

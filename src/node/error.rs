@@ -75,7 +75,7 @@ pub struct NameError {
     pub name: String,
     /// The title of the device description; `None` if only the names of the standard are known.
     pub title: Option<String>,
-    /// Several objects have this name in the EDS.
+    /// Whether several objects have this name in the EDS.
     pub is_shared: bool,
     /// The full names of these objects; else at most three similar names, the nearest first.
     pub nearest: Vec<String>,

@@ -23,7 +23,7 @@ pub fn read_values<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Result<
     Ok(values.collect())
 }
 
-/// The largest number of objects without an answer, one after the other, from a node that answers other objects.
+/// The largest number of consecutive unanswered reads of a node that answers the reads of other objects.
 const MAX_SILENT: u32 = 8;
 
 /// Reads objects that a device may not have, or may not answer. An object without a valid answer does not affect the

@@ -97,7 +97,7 @@ impl StateReport {
 struct StateSources {
     answers_sdo: bool,
     heartbeat: Option<Duration>,
-    /// 100Ch and 100Dh were read as 0: a guarding request does not start life guarding.
+    /// Whether 100Ch and 100Dh were read as 0. A guarding request then does not start life guarding.
     may_guard: bool,
 }
 

@@ -242,7 +242,7 @@ fn read_services<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Resu
     Ok(())
 }
 
-/// The TPDOs that the description lists. Without a description, or if it lists none: the first ones.
+/// The TPDOs that the description lists. Without a description, or if it lists none, the first TPDOs.
 fn tpdo_numbers(node: &Node) -> Vec<TpdoNumber> {
     let is_described = |number: &TpdoNumber| {
         node.model.as_ref().is_some_and(|model| model.dictionary.has_index(number.communication(0).index))

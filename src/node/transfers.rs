@@ -122,8 +122,8 @@ impl Transfers {
         self.finished.pop_front()
     }
 
-    /// The next node that sent two answers to one request, with the object. Each node is reported once, and once more if
-    /// the answers differ only later.
+    /// The next node that sent two answers to one request, with the object. Each node is reported once, and once more
+    /// if the answers differ only later.
     pub fn next_second_answer(&mut self) -> Option<(NodeId, ObjectId, SecondAnswer)> {
         self.second_answers.pop_front()
     }

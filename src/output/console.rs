@@ -11,11 +11,11 @@ use std::io::{self, Write};
 /// The amount and the form of the output on stderr.
 #[derive(Clone, Debug)]
 pub struct Console {
-    /// Errors only.
+    /// Whether only errors are printed.
     pub quiet: bool,
     /// The number of `-v` options.
     pub verbose: u8,
-    /// Errors as JSON.
+    /// Whether errors are printed as JSON.
     pub json: bool,
     /// Whether to use colour.
     pub color: ColorChoice,

@@ -45,8 +45,8 @@ struct Labelled {
 }
 
 impl Plot {
-    /// A plot of everything in a recording from the first to the second time; without them, from the first or to the
-    /// last value. `None` if there is no value.
+    /// A plot of everything in a recording from the first to the second time. Without the first time, it starts at the
+    /// first value. Without the second time, it ends at the last value. `None` if there is no value.
     pub fn new(recording: Recording, title: String, axis: TimeAxis, span: [Option<i64>; 2]) -> Option<Plot> {
         let (from, to) = (span[0].unwrap_or(i64::MIN), span[1].unwrap_or(i64::MAX));
         let mut units: BTreeMap<usize, Vec<Curve>> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Reads what `log` writes: recordings in both layouts and both formats, and files of events.
+//! Reads the files of `log`: recordings in both layouts and both formats, and events.
 
 mod cells;
 
@@ -66,7 +66,7 @@ pub enum TimeBase {
 pub struct Omitted {
     /// Lines that are not rows.
     pub lines: u64,
-    /// The number of the first of them.
+    /// The number of the first such line.
     pub first: u64,
     /// Whether the last line is incomplete.
     pub is_cut: bool,
@@ -200,7 +200,7 @@ impl Recording {
         }
     }
 
-    /// Puts the values and events in the order of their times, as files can be given in any order, and finds the gaps.
+    /// Puts the values and events in the order of their times, and finds the gaps. Files can be given in any order.
     pub fn finish(&mut self) {
         for curve in &mut self.curves {
             if !curve.points.is_sorted_by_key(|point| point.at) {

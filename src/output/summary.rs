@@ -17,7 +17,7 @@ use std::time::Duration;
 pub struct Written {
     /// Rows in the layout `long` or `wide`.
     pub rows: u64,
-    /// The lost rows among them, because writing was too slow or failed.
+    /// The rows among them that were lost because writing was too slow or failed.
     pub lost: u64,
     /// Events that were lost.
     pub events_lost: u64,
@@ -182,7 +182,7 @@ fn left_operational(report: &RecordingReport) -> Cell {
 /// The form of the summary on stderr.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SummaryForm {
-    /// Also the figures that are otherwise only in the JSON summary.
+    /// Whether the lines contain the figures that are otherwise only in the JSON summary.
     pub verbose: bool,
     /// The longest line in characters; `None` without a terminal.
     pub width: Option<usize>,

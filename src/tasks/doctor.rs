@@ -34,7 +34,7 @@ const OBSERVATION: Duration = Duration::from_secs(5);
 pub struct DoctorOptions {
     /// Examine only this node.
     pub node: Option<NodeId>,
-    /// Send nothing.
+    /// Whether nothing may be sent.
     pub passive: bool,
     /// Whether the bus may be searched for devices without a node-ID by LSS, if no node answers.
     pub lss: bool,

@@ -49,7 +49,7 @@ pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool
 struct Comparison {
     /// The number of settings that have their default.
     equal: usize,
-    /// Settings with the same value as before that is not their usual default. The default is not in the manual, or
+    /// Settings that kept their value, although it is not their usual default. The default is not in the manual, or
     /// differs between devices.
     unchanged: Vec<Snapshot>,
 }

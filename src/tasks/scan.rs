@@ -37,7 +37,7 @@ impl Found {
 
 /// Reads the device type of every node in parallel, then the identity of those that answer.
 ///
-/// Heartbeats and boot-up messages also show nodes, for example stopped ones that cannot answer. Nodes without an
+/// Heartbeats and boot-up messages also show nodes, for example stopped nodes that cannot answer. Nodes without an
 /// answer are asked `rounds` times in total; `timeout` is the wait after the last request.
 ///
 /// # Errors

@@ -92,9 +92,9 @@ pub struct Commissioning {
 /// `ObjFlags` of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ObjectFlags {
-    /// Bit 0: a tool that writes a whole configuration skips the object (1010h, 1011h).
+    /// Bit 0: whether a tool that writes a whole configuration skips the object (1010h, 1011h).
     pub skip_write: bool,
-    /// Bit 1: a tool that reads a whole device skips the object.
+    /// Bit 1: whether a tool that reads a whole device skips the object.
     pub skip_read: bool,
 }
 

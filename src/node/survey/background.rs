@@ -18,7 +18,7 @@ pub struct BackgroundSurvey {
     overrides: Overrides,
     answers: BTreeMap<ObjectId, Result<Answer, SdoError>>,
     pending: BTreeMap<Ticket, ObjectId>,
-    /// The number of the latest objects without an answer, one after the other.
+    /// The number of consecutive objects without an answer until now.
     silent: u8,
     /// Whether the survey fails if an object has no valid answer that had one before.
     insists: bool,

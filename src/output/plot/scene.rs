@@ -36,7 +36,7 @@ pub(super) struct Scene {
     pub(super) shapes: Vec<Shape>,
 }
 
-/// The width of a character. Texts are measured before they are drawn, so it is the widest one in use.
+/// The width of a character. Texts are measured before they are drawn, so this is the width of the widest font in use.
 pub(super) const CHARACTER: f64 = 7.0;
 
 /// The distance of two lines of text.

@@ -12,7 +12,7 @@ use std::io::{self, Write};
 /// The widths of a terminal that a plot can have.
 const WIDTHS: std::ops::RangeInclusive<usize> = 40..=400;
 
-/// The rows of a single panel, and of each of several ones.
+/// The rows of a single panel, and of each panel if there are several.
 const ROWS: [usize; 2] = [12, 8];
 
 /// The longest label of a curve.

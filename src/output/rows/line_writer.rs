@@ -149,8 +149,8 @@ impl LineWriter {
         self.put(Job::Header { place: HeaderPlace::NextFile, bytes })
     }
 
-    /// Sets the header of the file, which is already there or comes with the first row. It is written again if another
-    /// program truncates the file.
+    /// Sets the header of the file. The file contains it already, or it is written with the first row. It is written
+    /// again if another program truncates the file.
     pub(in crate::output) fn keep_header(&mut self, bytes: Vec<u8>) -> io::Result<()> {
         self.put(Job::Header { place: HeaderPlace::Present, bytes })
     }

@@ -1,8 +1,8 @@
 //! The wide layout: one row per cycle of SYNC or polling, with two columns per signal.
 //!
-//! A value belongs to the cycle in which it was received; a polled value, to the cycle in which it was requested. A row
-//! is complete when every column has a value. An incomplete row waits for one more cycle, at most half a second. Later
-//! values, and second values of a signal in one cycle, are omitted.
+//! A value belongs to the cycle in which it was received. A polled value belongs to the cycle in which it was
+//! requested. A row is complete when every column has a value. An incomplete row waits for one more cycle, at most half
+//! a second. Later values, and second values of a signal in one cycle, are omitted.
 
 use super::row::{Cell, Column};
 use crate::bus::{Mono, Stamp};

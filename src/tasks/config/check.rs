@@ -42,9 +42,9 @@ pub struct FileSettings {
 /// The sections of a file that are used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sections {
-    /// `[address]`.
+    /// Whether `[address]` is used.
     pub address: bool,
-    /// `[calibration]`.
+    /// Whether `[calibration]` is used.
     pub calibration: bool,
 }
 

@@ -18,7 +18,7 @@ pub enum Change {
     State(NmtState),
     /// The node started.
     BootUp,
-    /// No heartbeat came for twice the heartbeat time. The value is the time since the last one.
+    /// No heartbeat came for twice the heartbeat time. The value is the time since the last heartbeat.
     Lost(Duration),
     /// The heartbeat is back, with this state.
     Back(NmtState),
@@ -62,7 +62,7 @@ pub fn watch(
 
 struct Watcher<'a> {
     heartbeats: BTreeMap<NodeId, Heartbeat>,
-    /// The reads of 1017h, while frames are already watched.
+    /// The reads of 1017h that are in progress. Frames are already watched.
     reads: BTreeMap<Ticket, NodeId>,
     end: Mono,
     on_change: &'a mut dyn FnMut(&StateEvent) -> ControlFlow<()>,

@@ -124,8 +124,8 @@ pub fn set(master: &mut Master<'_>, node: &Node, signal: &str, wanted: &[(Limit,
     for &(limit, number) in wanted {
         writes.push(limit_write(node, described, &before, limit, number)?);
     }
-    // A device may reject a lower limit above the present upper limit. So rising limits are written with the upper one
-    // first.
+    // A device may reject a lower limit above the present upper limit. So if the limits rise, the upper limit is
+    // written first.
     if writes.iter().any(|write| write.limit == Limit::Upper && write.rises) {
         writes.reverse();
     }

@@ -268,8 +268,8 @@ impl Recording<'_> {
         self.exclude(node, Failure::at(node, LogFailure::TwoSenders(number)))
     }
 
-    /// Handles two answers to one request of another master. If their difference makes the setup uncertain, the TPDOs of
-    /// the node are ignored from now on.
+    /// Handles two answers to one request of another master. If their difference makes the setup uncertain, the TPDOs
+    /// of the node are ignored from now on.
     pub(super) fn second_answer(
         &mut self,
         node: NodeId,
