@@ -408,7 +408,7 @@ impl Station for Joins {
 #[test]
 fn second_device_that_joins_ends_polling() {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
-    bus.attach(Mute::new("mh4", &[]));
+    bus.attach(PartlySilent::new("mh4", &[]));
     bus.attach(Joins(Mono::START + Duration::from_secs(2)));
     let options = LogOptions { duration: None, ..polling() };
     let mut kept = Kept::default();

@@ -17,7 +17,7 @@ fn recording(command: &Command) -> Option<(bool, bool)> {
 /// Whether a row is a mapped status of a device that is not recognised. The simulator's record has no row for it.
 fn is_unnamed_status(spec: &Spec, row: &str) -> bool {
     let mut cells = row.split(',').skip(2);
-    spec.devices.iter().any(|device| device.oddity == Some(Oddity::Stranger))
+    spec.devices.iter().any(|device| device.oddity == Some(Oddity::Unidentified))
         && cells.next().is_some_and(|signal| signal.starts_with("0x"))
         && cells.next() == Some("")
 }
