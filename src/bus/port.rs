@@ -118,10 +118,11 @@ pub fn adapters() -> Vec<SerialAdapter> {
     found
 }
 
-/// The adapter at a port; `None` for a port of the computer itself, such as `ttyS0`.
+/// The adapter at a port; `None` for a port of the computer itself, such as `ttyS0`, and for a pseudo-terminal (`ttya0`).
 fn adapter(path: &Path, sysfs: &Path) -> Option<SerialAdapter> {
     let name = path.file_name()?.to_str()?;
-    if name.starts_with("ttyS") || name.starts_with("ttyAMA") {
+    let is_pseudo = matches!(name.as_bytes(), [b't', b't', b'y', b'a'..=b'z', b'0'..=b'9' | b'a'..=b'f']);
+    if name.starts_with("ttyS") || name.starts_with("ttyAMA") || is_pseudo {
         return None;
     }
     // The product name is one level above the device of ttyACM0, and two levels above that of ttyUSB0.
@@ -219,6 +220,8 @@ mod tests {
         assert_eq!(found("ttyACM0"), adapter("/dev/ttyACM0", Some("CANable ? b158aa7")));
         assert_eq!(found("ttyUSB3"), adapter("/dev/ttyUSB3", Some("USB Serial")));
         assert_eq!(found("ttyGS0"), adapter("/dev/ttyGS0", None));
-        assert_eq!(found("ttyS0"), None);
+        for own in ["ttyS0", "ttya0", "ttyzf"] {
+            assert_eq!(found(own), None, "{own}");
+        }
     }
 }

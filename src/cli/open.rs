@@ -20,8 +20,8 @@ use crate::node::targets;
 use crate::output;
 use crate::output::failure::ErrorMessage;
 use crate::sim::{Bench, BenchError};
-use crate::tasks::Failure;
 use crate::tasks::scan::ScanFailure;
+use crate::tasks::{Failure, Kind};
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
@@ -41,7 +41,7 @@ pub(super) fn spec(global: &Global) -> anyhow::Result<BusSpec> {
     let is_down = |error: &ErrorMessage| interfaces().iter().all(|(_, up)| !up).then(|| error.message.clone());
     match &global.bus {
         Some(bus) => Ok(bus.clone()),
-        None => Ok(within(global, only_interface, is_down)??),
+        None => Ok(within(global, || only(&interfaces()), is_down)??),
     }
 }
 
@@ -244,26 +244,24 @@ pub(super) fn has_interface() -> bool {
     interfaces().iter().any(|(_, up)| *up)
 }
 
-fn only_interface() -> Result<BusSpec, ErrorMessage> {
-    let all = interfaces();
+/// The only one of these CAN interfaces that is up. If none is up: the only one.
+fn only(all: &[(String, bool)]) -> Result<BusSpec, ErrorMessage> {
     let up: Vec<&String> = all.iter().filter(|(_, up)| *up).map(|(name, _)| name).collect();
-    if let [only] = up.as_slice() {
-        return Ok(BusSpec::SocketCan((*only).clone()));
-    }
-    let list: Vec<String> =
-        all.iter().map(|(name, up)| format!("{name} ({})", if *up { "up" } else { "down" })).collect();
-    let message = match (all.is_empty(), up.is_empty()) {
-        (true, _) => "this computer has no CAN interface".to_owned(),
-        (false, true) => format!("no CAN interface is up: {}", list.join(", ")),
-        (false, false) => format!("several CAN interfaces are up: {}", list.join(", ")),
+    let (kind, words) = match (up.as_slice(), all) {
+        ([only], _) => return Ok(BusSpec::SocketCan((*only).clone())),
+        (_, []) => {
+            let message = ErrorMessage::new(Kind::Bus, "this computer has no CAN interface");
+            return Err(message.hint("without hardware: --bus sim"));
+        }
+        ([], [(only, _)]) => return Ok(BusSpec::SocketCan(only.clone())),
+        ([], _) => (Kind::Bus, "no CAN interface is up"),
+        _ => (Kind::Usage, "several CAN interfaces are up"),
     };
-    let example =
-        up.first().or(all.iter().map(|(name, _)| name).collect::<Vec<_>>().first()).map(|name| name.to_string());
-    let hint = match example {
-        Some(name) => format!("choose one: --bus {name}; without hardware: --bus sim"),
-        None => "without hardware: --bus sim".to_owned(),
-    };
-    Err(ErrorMessage::usage(message).hint(hint))
+    let state = |up: bool| if up { "up" } else { "down" };
+    let list: Vec<String> = all.iter().map(|(name, up)| format!("{name} ({})", state(*up))).collect();
+    let example = up.first().map_or(&all[0].0, |name| *name);
+    let hint = format!("choose one: --bus {example}; without hardware: --bus sim");
+    Err(ErrorMessage::new(kind, format!("{words}: {}", list.join(", "))).hint(hint))
 }
 
 /// The nodes given by the user; for `all`, those found by [`all`].
@@ -294,6 +292,22 @@ mod tests {
     use super::*;
     use crate::cli::Cli;
     use clap::Parser;
+
+    #[test]
+    fn interface_is_chosen_if_only_one_is_possible() {
+        let chosen = |all: &[(&str, bool)]| {
+            let all: Vec<(String, bool)> = all.iter().map(|(name, up)| ((*name).to_owned(), *up)).collect();
+            let name = |spec| if let BusSpec::SocketCan(name) = spec { name } else { panic!("an interface") };
+            only(&all).map(name).map_err(|error| (error.kind, error.message))
+        };
+        assert_eq!(chosen(&[("can0", false), ("can1", true)]), Ok("can1".to_owned()));
+        assert_eq!(chosen(&[("can0", false)]), Ok("can0".to_owned()), "opening it reports that it is down");
+        assert_eq!(chosen(&[]), Err((Kind::Bus, "this computer has no CAN interface".to_owned())));
+        let down = "no CAN interface is up: can0 (down), can1 (down)".to_owned();
+        assert_eq!(chosen(&[("can0", false), ("can1", false)]), Err((Kind::Bus, down)));
+        let several = "several CAN interfaces are up: can0 (up), can1 (up)".to_owned();
+        assert_eq!(chosen(&[("can0", true), ("can1", true)]), Err((Kind::Usage, several)));
+    }
 
     #[test]
     fn wait_ends_when_the_interface_is_up_or_the_time_is_over() {

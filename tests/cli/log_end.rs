@@ -90,7 +90,7 @@ fn unknown_signals_are_refused() {
     bench.run("log 127 pressure.status").fails(2, "cangauge: no node has a status object for pressure\n");
     bench
         .run("log 127 0x6132:1")
-        .fails(6, "cangauge: no TPDO contains 0x6132:1\nhint: read it by SDO instead: add --poll 100ms\n");
+        .fails(6, "cangauge: no TPDO contains 0x6132:1\nhint: read it by SDO: --poll 100ms (without --sync); or put it into a TPDO: cangauge pdo map --help\n");
     bench.run("log 127 0x6132:1 --poll 100ms --count 3").exit(0);
 }
 

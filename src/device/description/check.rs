@@ -165,6 +165,10 @@ fn mapped(description: &Description, table: &Table<'_>, word: i64) {
 /// Checks that default, limits, ranges and meanings fit the type, and that the default and the meanings are allowed
 /// values.
 fn values(entry: &ObjectEntry, table: &Table<'_>) {
+    let [low, high] = [&entry.low, &entry.high].map(|limit| limit.as_ref().and_then(Scalar::as_f64));
+    if low.zip(high).is_some_and(|(low, high)| low > high) {
+        return table.mistake("low", "low: it is greater than high");
+    }
     for (key, scalar) in [("low", &entry.low), ("high", &entry.high), ("default", &entry.default)] {
         let Some(scalar) = scalar else { continue };
         match scalar.encode(entry.data_type, NodeId::MIN) {
@@ -216,6 +220,9 @@ fn signals(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
             table.mistake("status_bits", "status_bits: there is no status object");
         }
         let type_of = |object: ObjectId| description.object(object).map(|entry| entry.data_type);
+        if let Some(data_type) = type_of(signal.value).filter(|data_type| data_type.width().is_none()) {
+            table.mistake("value", format!("value: [[object]] {} is not a number, but {data_type}", signal.value));
+        }
         if let (Some(bits), Some(status)) = (&signal.status_bits, signal.status) {
             status_bits(bits, type_of(status), table);
         }
@@ -283,6 +290,20 @@ fn identify(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_
         let text = "no [identify]: the device is not recognised, the description is used only with --device";
         return tables.file.note("name", text);
     };
+    let Identify { device_type, vendor_id, product_code, .. } = description.identify;
+    let numbers = [
+        ("device_type", device_type, ObjectId::DEVICE_TYPE),
+        ("vendor_id", vendor_id, ObjectId::new(0x1018, 1)),
+        ("product_code", product_code, ObjectId::new(0x1018, 2)),
+    ];
+    for (key, number, object) in numbers {
+        let default = description.object(object).and_then(|entry| entry.default.as_ref());
+        if let (Some(number), Some(&Scalar::Integer(default))) = (number, default)
+            && i64::from(number) != default
+        {
+            table.mistake(key, format!("{key}: [[object]] {object} has the default 0x{default:08X}"));
+        }
+    }
     for (object, value) in &description.identify.confirm {
         match description.object(*object) {
             None => known.require(table, "confirm", *object),

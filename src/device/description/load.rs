@@ -119,6 +119,9 @@ fn identify_entry(table: &mut Table<'_>) -> Identify {
 
 fn factory(table: &mut Table<'_>) -> Factory {
     let factory = Factory { node_id: table.optional("node_id"), bit_rate: table.optional("bit_rate") };
+    if let Some(rate) = factory.bit_rate.filter(|rate| !(5_000..=1_000_000).contains(rate)) {
+        table.mistake("bit_rate", format!("bit_rate: {rate} bit/s is not in the range 5000 to 1000000"));
+    }
     table.finish();
     factory
 }

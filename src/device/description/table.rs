@@ -184,11 +184,14 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// Reports every unknown key, and every missing key, unless it is the misspelt unknown key.
+    /// Reports every unknown key with the known ones, the most similar first, and every missing key, unless it is the
+    /// misspelt unknown key.
     pub(super) fn finish(&mut self) {
         for (name, _) in self.table {
             if !self.known.contains(&name.get_ref().as_ref()) {
-                let message = format!("unknown key \"{}\" (known: {})", name.get_ref(), self.known.join(", "));
+                let mut known = self.known.clone();
+                known.sort_by_key(|key| distance(key, name.get_ref()).min(3));
+                let message = format!("unknown key \"{}\" (known: {})", name.get_ref(), known.join(", "));
                 self.source.mistake(name.span().start, message);
                 self.missing.retain(|key| distance(key, name.get_ref()) > 2);
             }

@@ -21,8 +21,8 @@ fn source_and_identify_are_optional() {
 
 #[test]
 fn unknown_keys_are_listed_with_their_line() {
-    let known = "name, title, vendor, source, unconfirmed, quirks, error_history, error_counters, repeating_average_ms, auto_bit_rate, \
-                 identify, bit_rates, factory, sdo, pdo, startup, assign, autozero, signal, object, emcy";
+    let known = "signal, name, title, vendor, source, unconfirmed, quirks, error_history, error_counters, repeating_average_ms, \
+                 auto_bit_rate, identify, bit_rates, factory, sdo, pdo, startup, assign, autozero, object, emcy";
     let expected = format!("x.toml:4: unknown key \"signals\" (known: {known})");
     assert_eq!(mistakes("signals = 1"), [expected]);
     let below = mistakes(
@@ -191,4 +191,24 @@ fn signals_outside_of_cia_404_have_unit_scale_and_status_of_their_own() {
         assert_eq!(found, [format!("x.toml:5: name: \"{name}\" begins or ends with a hyphen")]);
     }
     assert!(wrong("markers = { odd = [1] }")[0].starts_with("x.toml:7: unknown key \"odd\""));
+}
+
+#[test]
+fn contradictions_of_numbers_are_mistakes() {
+    let object = |at: &str, data_type: &str, more: &str| {
+        format!("[[object]]\nat = \"{at}\"\nname = \"o\"\ntype = \"{data_type}\"\naccess = \"rw\"\n{more}\n")
+    };
+    let signal = "[[signal]]\nname = \"p\"\nvalue = \"0x2100\"\n";
+    for (text, expected) in [
+        ("[factory]\nbit_rate = 250\n".to_owned(), "bit_rate: 250 bit/s is not in the range 5000 to 1000000"),
+        (object("0x2100", "u8", "low = 9\nhigh = 1\ndefault = 3"), "low: it is greater than high"),
+        (signal.to_owned() + &object("0x2100", "vs", ""), "value: [[object]] 0x2100:0 is not a number, but vs"),
+        (
+            "[identify]\nvendor_id = 7\n".to_owned() + &object("0x1018:1", "u32", "default = 8"),
+            "vendor_id: [[object]] 0x1018:1 has the default 0x00000008",
+        ),
+    ] {
+        let found = mistakes(&text);
+        assert!(found.len() == 1 && found[0].ends_with(expected), "{text}: {found:?}");
+    }
 }

@@ -26,7 +26,8 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
                 ),
                 None => format!("no TPDO contains {name}"),
             };
-            Words::new(words).hint("read it by SDO instead: add --poll 100ms")
+            Words::new(words)
+                .hint("read it by SDO: --poll 100ms (without --sync); or put it into a TPDO: cangauge pdo map --help")
         }
         LogFailure::DifferentSyncIds(ids) => {
             let ids: Vec<String> = ids.iter().map(|(node, id)| format!("node {node}: {id}")).collect();
