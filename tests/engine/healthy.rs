@@ -41,7 +41,7 @@ fn healthy(seed: u64) -> Spec {
         (0u8..).zip(&mut spec.devices).for_each(|(at, device)| device.node = Some(10 + 3 * at));
     }
     let every_ms = *random.pick(&[20, 100, 500]);
-    let plan = (0..10_000 / every_ms).map(|count| (count * every_ms * 1000, Act::Sync)).collect();
+    let plan = (0..60_000 / every_ms).map(|count| (count * every_ms * 1000, Act::Sync)).collect();
     Spec { others: vec![Other::Master { plan }], faults: Vec::new(), interrupts: Vec::new(), kill: None, ..spec }
 }
 
