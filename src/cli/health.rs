@@ -15,7 +15,7 @@ use clap::Args;
 ///
 /// Reads 1017h of each node once, and then 1000h repeatedly. Each node is read at most once in 100 ms, and all reads
 /// together take at most 5 % of the bus. Heartbeat intervals are shown as min / mean / max. SDO answer times are shown
-/// as min / mean / 99th percentile / max (number).
+/// as min / mean / 99th percentile / max (number of answers).
 ///
 /// The limits are: mean load 60 %; load in each second 80 %; heartbeat interval 1.5 times the heartbeat time (1017h);
 /// 99 % of the SDO answers within 100 ms; no errors, emergencies or restarts. The command check compares the same

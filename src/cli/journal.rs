@@ -91,7 +91,7 @@ impl Journal for FileJournal {
 
     fn remove(&mut self, write: &TemporaryWrite) {
         if let Some(path) = self.path_of(write) {
-            // If the file remains, the next run finds that the object has changed since then.
+            // If the file remains, the next run finds another value in the object, and writes nothing.
             let _ = fs::remove_file(&path);
             self.own.remove(&path);
         }
@@ -146,7 +146,7 @@ impl config::Journal for SettingsJournal<'_> {
 
     fn finish(&mut self) {
         if let Some(path) = &self.path {
-            // A remaining file is older than the settings. --rollback then reports it, because the values differ.
+            // If the file remains, --rollback finds other values in the device than an interrupted change leaves.
             let _ = fs::remove_file(path);
         }
     }

@@ -1,7 +1,7 @@
 //! Detects a second answer to one request: two devices with one node-ID, or a bridge that repeats frames.
 //!
-//! A server answers each request once. But a second answer is ignored if another master sent a request, or if the
-//! request was repeated: these requests have their own answers.
+//! A server answers each request once, so a second answer shows two devices or a bridge. It is ignored if another master
+//! sent a request, or if the request was repeated: these requests have their own answers.
 
 use super::Master;
 use super::request::{Operation, SdoError, SdoFailure};
@@ -155,9 +155,9 @@ impl Answers {
         self.wait_until = Some(at + wait);
     }
 
-    /// Whether this frame repeats the latest frame and so does not belong to the present request. This is certain in
-    /// two cases: in a segmented transfer, where two segments in succession differ, and if the previous request was of
-    /// the other kind (read or write). An abort is the same for both kinds, so it proves nothing.
+    /// Whether this frame repeats the latest frame and so does not belong to the present request. This is certain in a
+    /// segmented transfer, because two successive segments always differ (toggle bit). It is also certain if the previous
+    /// request was of the other kind (read or write). An abort is the same for both kinds, so it proves nothing.
     pub(super) fn is_repetition(&self, frame: &Frame, operation: Operation, is_in_segments: bool, at: Mono) -> bool {
         let is_abort = frame.data().first() == Some(&0x80);
         let is_other = !is_abort && self.initial.is_some_and(|(_, previous)| previous != operation);
@@ -186,7 +186,7 @@ impl Answers {
         else {
             return false;
         };
-        // The earlier answer may be a late answer to a previous request.
+        // An answer that was received twice may be a late one, so it proves nothing.
         if self.count(&first) == 1 && self.differing().is_none() {
             self.finding = Some(SecondAnswer { first, second: *frame });
         }
@@ -324,7 +324,7 @@ mod tests {
         log.on_waited(ms(14));
         log.on_answer(frame(SERIAL), Operation::Read, Some(ms(30)), ms(31));
         assert_eq!(log.wait_until(), None);
-        // With repeated answers, every value is compared.
+        // After a repeated answer, the master waits after every request again.
         assert!(log.on_unexpected(&frame(SERIAL), ms(32)));
         assert_eq!(log.wait_until(), Some(ms(35)));
         assert!(Answers::default().needs_check());

@@ -10,8 +10,8 @@
 //!    form is also rejected, the first abort code is reported.
 //! 4. Before a value is sent without its size, the width of the object is checked. If the object is wider, the node
 //!    would add zero bytes: -5 as INTEGER16 would become 65531 in an INTEGER32.
-//! 5. A signature ("save", "load", "zero", "tara", a number with "set") starts an action. It is sent once and never
-//!    repeated.
+//! 5. A signature ("save", "load", "zero", "tara", a number with "set") starts an action. It is sent again only in the
+//!    other form, after a rejection (3).
 //! 6. If no answer comes, a plain value is read back. A signature cannot be read back, so its result is unknown.
 
 use super::Node;
@@ -69,7 +69,7 @@ pub struct WriteOptions<'a> {
 pub enum Written {
     /// The node acknowledged the write.
     Acknowledged,
-    /// No answer came. The object was read back and has the value. The frame is one received instead of the answer.
+    /// No answer came. The object was read back and has the value. The frame was received instead of the answer.
     ReadBack(Option<Frame>),
 }
 

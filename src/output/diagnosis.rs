@@ -103,7 +103,7 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, silence: &Silence) -> Strin
             format!("{number} waits for SYNC without a counter (1019h is 0), and SYNC is sent with one{also}")
         }
         TpdoCause::SyncStart(start) => format!(
-            "{number} starts at the SYNC with counter {start} ({communication:04X}h:6), and no SYNC has it (1019h){also}"
+            "{number} starts at the SYNC with counter {start} ({communication:04X}h:6), and the counter never has this value (1019h){also}"
         ),
         TpdoCause::SyncRejected => format!("{number} waits for SYNC, and the node rejects the length of SYNC"),
         TpdoCause::TooFewSyncs { every, seen } => {
@@ -116,11 +116,11 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, silence: &Silence) -> Strin
         TpdoCause::NotSentOnRequest => not_sent(number, "on each remote request", silence),
         TpdoCause::NotSentAtSync => not_sent(number, "at SYNC, and SYNC was sent", silence),
         TpdoCause::SlowEventTimer(timer) => {
-            format!("the event timer of {number} is longer ({communication:04X}h:5 is {timer} ms)")
+            format!("the event timer of {number} is longer than the wait ({communication:04X}h:5 is {timer} ms)")
         }
         TpdoCause::InhibitTime(inhibit) => {
             let inhibit = format_duration(Duration::from_micros(100) * u32::from(inhibit));
-            format!("the inhibit time of {number} is longer ({communication:04X}h:3 is {inhibit}){also}")
+            format!("the inhibit time of {number} is longer than the wait ({communication:04X}h:3 is {inhibit}){also}")
         }
         TpdoCause::ChannelOff(mode) => format!("its channel is off ({mode} is 0)"),
         TpdoCause::InterruptsDisabled(object) => {
@@ -170,7 +170,7 @@ fn not_sent(number: TpdoNumber, when: &str, silence: &Silence) -> String {
     };
     let heard = match unknown.is_empty() {
         true => String::new(),
-        false => format!(", but frames with COB-ID {}, which none of its TPDOs has", unknown.join(", ")),
+        false => format!(" (frames with COB-ID {} were received, which no TPDO of the node has)", unknown.join(", ")),
     };
     format!("{number} is due {when}, and no {number} was received{heard}: {state}")
 }
@@ -197,7 +197,7 @@ pub fn reasons(nodes: &[(NodeId, Silence)]) -> String {
     reasons.join("; ")
 }
 
-/// A command to type, or one thing to check. `log` is the text before options of `log`: `add`, or the command.
+/// A command to type, or one thing to check. `log` is the beginning of the hint: `add`, or `cangauge log 5`.
 pub fn hint(silence: &Silence, node: NodeId, log: &str) -> Option<String> {
     let poll = || Some(format!("read by SDO instead: {log} --poll 100ms"));
     match &silence.cause {
@@ -237,9 +237,9 @@ pub fn hint(silence: &Silence, node: NodeId, log: &str) -> Option<String> {
                 "read by SDO instead: {log} --poll 100ms (or: cangauge pdo map {node} {} --event-timer 100ms)",
                 number.get()
             )),
-            TpdoCause::SyncRejected => {
-                Some(format!("SYNC has a counter if 1019h of the node is not 0: cangauge sdo read {node} 0x1019"))
-            }
+            TpdoCause::SyncRejected => Some(format!(
+                "the node expects SYNC with a counter if its 1019h is not 0: cangauge sdo read {node} 0x1019"
+            )),
             TpdoCause::Disabled
             | TpdoCause::NothingMapped(_)
             | TpdoCause::NotSentOnRequest

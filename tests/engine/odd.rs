@@ -70,7 +70,7 @@ impl TpdoFault {
         match self {
             TpdoFault::Disabled => "(bit 31 of 1800h:1)",
             TpdoFault::OnRequest => "is sent on remote request only (1800h:2",
-            TpdoFault::SlowTimer => "is longer (1800h:5 is 60000 ms)",
+            TpdoFault::SlowTimer => "is longer than the wait (1800h:5 is 60000 ms)",
             TpdoFault::WaitsForSync => "waits for SYNC, and no node sends SYNC",
             TpdoFault::FewSyncs => "is sent at every 240th SYNC",
             TpdoFault::LeavesOperational => "it is pre-operational again after the start",

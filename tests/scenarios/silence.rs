@@ -226,7 +226,7 @@ fn each_cause_has_its_reason() {
         (
             "slow event timer",
             Case::mh4("\"0x1800:1\" = 0xC0000185, \"0x1801:5\" = 10000"),
-            "the event timer of TPDO2 is longer (1801h:5 is 10000 ms)",
+            "the event timer of TPDO2 is longer than the wait (1801h:5 is 10000 ms)",
         ),
         (
             "no trigger",
@@ -303,19 +303,19 @@ fn each_cause_has_its_reason() {
         (
             "SYNC start value, and SYNC without a counter",
             Case { no_nmt: true, ..inputs("set = { \"0x1800:2\" = 1, \"0x1800:6\" = 5 }\n").sync(100) },
-            "TPDO1 starts at the SYNC with counter 5 (1800h:6), and no SYNC has it (1019h), or the node is not operational",
+            "TPDO1 starts at the SYNC with counter 5 (1800h:6), and the counter never has this value (1019h), or the node is not operational",
         ),
         (
             "another COB-ID than in 1800h:1, at SYNC",
             Case { no_nmt: true, ..Case::mh4("").sync(100) }
                 .hears(&[(2000, "1C5#0000A03F00"), (2100, "1C5#0000A03F00")]),
-            "no TPDO1 was received, but frames with COB-ID 1C5, which none of its TPDOs has: \
+            "no TPDO1 was received (frames with COB-ID 1C5 were received, which no TPDO of the node has): \
              the node is not operational, or sends with another COB-ID",
         ),
         (
             "another COB-ID than in 1801h:1, by timer",
             Case { no_nmt: true, ..Case::mh4(timer) }.hears(&[(2100, "3A5#00"), (2200, "745#05")]),
-            "no TPDO2 was received, but frames with COB-ID 3A5, which",
+            "no TPDO2 was received (frames with COB-ID 3A5 were received",
         ),
         (
             "TPDO of another node with a heartbeat",
@@ -353,12 +353,12 @@ fn each_cause_has_its_reason() {
         (
             "inhibit time",
             inputs("set = { \"0x6423\" = 1, \"0x1800:3\" = 60000 }\n"),
-            "the inhibit time of TPDO1 is longer (1800h:3 is 6 s)",
+            "the inhibit time of TPDO1 is longer than the wait (1800h:3 is 6 s)",
         ),
         (
             "event timer behind an inhibit time",
             Case { no_nmt: true, ..inputs("set = { \"0x1800:5\" = 100, \"0x1800:3\" = 60000 }\n") },
-            "the inhibit time of TPDO1 is longer (1800h:3 is 6 s)",
+            "the inhibit time of TPDO1 is longer than the wait (1800h:3 is 6 s)",
         ),
         (
             "polled object is write-only",

@@ -318,7 +318,7 @@ impl Slcan {
         }
     }
 
-    /// Reports new error flags. States of the controller are reported when they change.
+    /// Reports the error flags of a read: errors at each read, states of the controller only when they begin.
     fn report_flags(&mut self, before: Option<u8>, now: Stamp, out: &mut Output) {
         let Some(flags) = self.flags else { return };
         let new = flags & !before.unwrap_or(0);

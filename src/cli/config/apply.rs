@@ -33,10 +33,10 @@ use std::path::{Path, PathBuf};
 /// Configure a device from a file: check the file, write the differences, read everything back
 ///
 /// Settings are written in this order: sensor type, unit, digits, filter, limits, other objects, guarding and
-/// heartbeat, TPDOs, COB-IDs. Then they are stored. Node-ID and bit rate come last. A second run prints "0 changes". If
-/// a write fails, the error lists the written settings and the missing ones. Run the same command again to continue, or
-/// with --rollback to restore the old settings. The old settings are kept in $XDG_STATE_HOME/cangauge (or
-/// ~/.local/state/cangauge) until the change is complete.
+/// heartbeat, TPDOs, COB-IDs. With --store, they are then stored. Node-ID and bit rate come last. A second run prints
+/// "0 changes". If a write fails, the error lists the written settings and the missing ones. Run the same command again
+/// to continue, or with --rollback to restore the old settings. The old settings are kept in $XDG_STATE_HOME/cangauge
+/// (or ~/.local/state/cangauge) until the change is complete.
 #[derive(Debug, Args)]
 pub(super) struct Apply {
     /// Nodes (5, 0x7f, 1-16, 1,5, all), and the file
@@ -54,8 +54,7 @@ pub(super) struct Apply {
     /// Set settings that are not in the file to their factory defaults
     #[arg(long)]
     exact: bool,
-    /// Also set the section [address]: node-ID, bit rate, COB-IDs that are set in the file, SYNC producer. For one node
-    /// only
+    /// Also set the section [address]: node-ID, bit rate, COB-IDs, SYNC producer. For one node only
     #[arg(long)]
     address: bool,
     /// Also set the section [calibration]. The serial number in the file must be that of the device
@@ -65,7 +64,7 @@ pub(super) struct Apply {
     #[arg(long, conflicts_with_all = ["exact", "address", "with_calibration"])]
     rollback: bool,
     /// Configure many devices, one per row. Columns: vendor, product, serial, node (with --address), and one for each
-    /// {NAME} in the file. A device that is not in the table is not changed
+    /// placeholder {NAME} in the settings file. A device that is not in the table is not changed
     #[arg(long, value_name = "FILE.csv", conflicts_with = "rollback")]
     table: Option<PathBuf>,
     /// Set devices that are plugged in one after the other, each with the values of its row. Includes --address and

@@ -1,8 +1,8 @@
 //! Nodes whose setup must be read again.
 //!
 //! After any event that may have changed the mapping, unit or digits of a node, its setup is uncertain. Its frames are
-//! then ignored until the setup was read again. Missing rows are counted and reported. Rows decoded with an old mapping
-//! would look right but be wrong.
+//! then ignored until the setup was read again (exceptions: [`RereadReason`]). Missing rows are counted and reported. Rows
+//! decoded with an old mapping would look right but be wrong.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
@@ -20,12 +20,12 @@ use std::time::Duration;
 const WRITE_SETTLE_TIME: Duration = Duration::from_millis(500);
 /// Interval between two attempts to read a node that does not answer.
 const RETRY_INTERVAL: Duration = Duration::from_secs(1);
-/// In so many attempts, a node must answer all objects that it answered before.
+/// The number of attempts that fail if the node does not answer an object that it answered before.
 const COMPLETE_ATTEMPTS: u32 = 5;
 /// Shortest interval between two rereads of a node because frames were lost. An overloaded bus loses frames all the
 /// time.
 const FRAMES_LOST_INTERVAL: Duration = Duration::from_secs(60);
-/// Shortest interval between two rereads of a node because of a wrong length, if nothing had changed.
+/// Shortest interval between two rereads of a node because of a wrong length, if the last one found no change.
 const WRONG_LENGTH_INTERVAL: Duration = Duration::from_secs(60);
 
 /// Why the setup of a node must be read again.
@@ -37,8 +37,8 @@ pub(super) enum RereadReason {
     Written,
     /// The length of a TPDO differs from its mapping, so the TPDO was ignored. Other TPDOs are still recorded.
     WrongLength,
-    /// Frames were lost, perhaps also a boot-up message or a write. This is rare, so frames of the node are still
-    /// recorded. If the setup did change, the affected time is reported.
+    /// Frames were lost. A boot-up message or a write is rarely among them, so frames of the node are still recorded. If
+    /// the setup did change, the affected time is reported.
     FramesLost,
 }
 
@@ -168,7 +168,7 @@ impl Rereads {
         self.wrong_lengths.remove(&node);
     }
 
-    /// The nodes whose frames are ignored.
+    /// The nodes with an uncertain setup, except those with lost frames only.
     pub(super) fn paused(&self) -> impl Iterator<Item = NodeId> + '_ {
         self.pending.iter().filter(|(_, pending)| pending.recorded_since.is_none()).map(|(&node, _)| node)
     }
