@@ -299,7 +299,9 @@ fn mistakes_in_a_description_are_shown_with_their_places() {
 fn description_of_another_vendor_is_used_only_with_types_of_cia_404() {
     let devices = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/mh4.toml");
     let text = fs::read_to_string(devices).expect("the description");
-    let other = text.replacen("name = \"mh4\"", "name = \"other\"", 1).replace("default = 71\n", "default = 0x7777\n");
+    let other = text.replacen("name = \"mh4\"", "name = \"other\"", 1);
+    let other =
+        other.replace("default = 71\n", "default = 0x7777\n").replace("vendor_id = 71\n", "vendor_id = 0x7777\n");
     let bench = Bench::described("[[device]]\nkind = \"other.toml\"\nnode = 5\n");
     for (file, fitting) in [(other.clone(), &["mh4", "hydac"][..]), (other.replace("0x00820194", "0x00820191"), &[])] {
         fs::write(bench.path("other.toml"), file).expect("written");
