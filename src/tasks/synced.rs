@@ -73,12 +73,12 @@ impl SyncedTpdo {
     }
 
     /// Whether a TPDO that arrives now is in excess.
-    fn is_surplus(&self, is_producer: bool) -> bool {
+    fn is_surplus(&self, is_only_producer: bool) -> bool {
         let Some(every) = self.every else {
             return self.is_shared || self.pairs + 1 >= PAIRS && self.has_pair() && self.requests == 0;
         };
         let due = self.requests
-            + match is_producer {
+            + match is_only_producer {
                 true => self.syncs.div_ceil(every),
                 false => self.syncs / every + FOREIGN_TOLERANCE,
             };
@@ -95,8 +95,10 @@ impl SyncedTpdo {
 #[derive(Debug, Default)]
 pub(super) struct SyncedTpdos {
     tpdos: BTreeMap<CanId, SyncedTpdo>,
-    /// Whether this program sends SYNC, so that every SYNC is counted.
+    /// Whether this program sends SYNC.
     is_producer: bool,
+    /// Whether another node sends SYNC, so that a SYNC may have been missed.
+    has_other_producer: bool,
     /// Whether this program sends remote requests, which it does not receive.
     is_requesting: bool,
 }
@@ -168,9 +170,10 @@ impl SyncedTpdos {
 
     /// Handles a frame. Returns a surplus TPDO, which must not be used.
     pub(super) fn take(&mut self, frame: &Frame, at: Mono) -> Option<Surplus> {
-        let is_producer = self.is_producer;
+        let is_only_producer = self.is_producer && !self.has_other_producer;
         let Some(tpdo) = self.tpdos.get_mut(&frame.id()) else {
-            if !is_producer && !frame.is_remote() {
+            if !frame.is_remote() && self.tpdos.values().any(|tpdo| tpdo.sync == frame.id()) {
+                self.has_other_producer = true;
                 self.on_sync(frame.id(), at);
             }
             return None;
@@ -183,7 +186,7 @@ impl SyncedTpdos {
         tpdo.since_sync.push(at);
         tpdo.since_sync.truncate(3);
         let previous = tpdo.last.replace(*frame);
-        if !tpdo.is_surplus(is_producer) {
+        if !tpdo.is_surplus(is_only_producer) {
             tpdo.received += u64::from(tpdo.syncs > 0);
             return None;
         }
@@ -200,7 +203,7 @@ mod tests {
     use crate::canopen::pdo::CobId;
 
     /// The result for a TPDO at every n-th SYNC (0: its type is unknown): `S` is SYNC, `-` a pause, and other letters
-    /// are TPDOs with this content, one every millisecond.
+    /// are TPDOs with this content, one every millisecond. `F` is a SYNC of another node.
     fn found(is_producer: bool, every: u8, frames: &str) -> Vec<(usize, bool)> {
         let mut node = Node::new(NodeId::new(5).expect("a node-ID"));
         node.tpdos.push(Tpdo {
@@ -221,7 +224,7 @@ mod tests {
             }
             let text = match letter {
                 b'-' => continue,
-                b'S' => "080#".to_owned(),
+                b'S' | b'F' => "080#".to_owned(),
                 b'R' => "185#R1".to_owned(),
                 _ => format!("185#{letter:02X}"),
             };
@@ -252,6 +255,8 @@ mod tests {
         assert_eq!(found(false, 1, "SabSab"), [(5, true)]);
         assert_eq!(found(false, 1, "SaaSaaSaa"), [(5, false)]);
         assert_eq!(found(false, 2, "aSSbSScSSdSSe"), []);
+        assert_eq!(found(true, 1, "SaFbSFcdSeFFfgS"), [], "both nodes send SYNC");
+        assert_eq!(found(true, 1, "SaFbScSdeSfg"), [(11, true)]);
     }
 
     #[test]
