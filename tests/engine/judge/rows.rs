@@ -1,7 +1,6 @@
 //! Recorded values were sent, and actions are sent once.
 
 use super::*;
-use crate::odd::Oddity;
 
 /// The source of the rows of a command, and whether it records every value.
 fn recording(command: &Command) -> Option<(bool, bool)> {
@@ -14,12 +13,11 @@ fn recording(command: &Command) -> Option<(bool, bool)> {
     }
 }
 
-/// Whether a row is a mapped status of a device that is not recognised. The simulator's record has no row for it.
+/// Whether a row is a mapped status of a device that is not recognised, perhaps because of a fault. The simulator's
+/// record has no row for it.
 fn is_unnamed_status(spec: &Spec, row: &str) -> bool {
     let mut cells = row.split(',').skip(2);
-    spec.devices.iter().any(|device| device.oddity == Some(Oddity::Unidentified))
-        && cells.next().is_some_and(|signal| signal.starts_with("0x"))
-        && cells.next() == Some("")
+    !spec.is_clean() && cells.next().is_some_and(|signal| signal.starts_with("0x")) && cells.next() == Some("")
 }
 
 /// Every row is a value that was sent, and no value has two rows.
