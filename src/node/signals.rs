@@ -129,10 +129,24 @@ pub(crate) fn scaling_objects(node: &Node) -> Vec<ObjectId> {
 
 /// The objects with unit and digits of a signal. A description can name others than 6131h and 6132h of the channel.
 pub(crate) fn unit_and_digits(node: &Node, signal: &Signal) -> [Option<ObjectId>; 2] {
-    let described = node.model.iter().flat_map(|model| &model.description.signals);
-    let entry = described.into_iter().find(|entry| entry.name == signal.name && entry.value == signal.value_object.0);
-    let of_channel = |index: u16| signal.has_channel().then(|| ObjectId::new(index, signal.channel));
-    let unit = entry.and_then(|entry| entry.unit).or_else(|| of_channel(0x6131).filter(|_| signal.unit.is_none()));
-    let digits = entry.and_then(|entry| entry.digits).or_else(|| of_channel(0x6132));
-    [unit, digits.filter(|_| signal.rules.scaling == Scaling::Digits)]
+    let of_channel = signal.has_channel().then(|| ObjectId::new(0x6132, signal.channel));
+    let digits = entry(node, signal).and_then(|entry| entry.digits).or(of_channel);
+    [unit_object(node, signal), digits.filter(|_| signal.rules.scaling == Scaling::Digits)]
+}
+
+/// The object with the unit code of a signal: the one in its description, else 6131h of its channel. `None` if the unit
+/// is fixed.
+pub(crate) fn unit_object(node: &Node, signal: &Signal) -> Option<ObjectId> {
+    let entry = entry(node, signal);
+    let is_fixed = entry.is_some_and(|entry| entry.fixed_unit.is_some())
+        || node.fixed_unit(signal.value_object.0).is_some()
+        || !signal.has_channel();
+    let of_channel = (!is_fixed).then(|| ObjectId::new(0x6131, signal.channel));
+    entry.and_then(|entry| entry.unit).or(of_channel)
+}
+
+/// The signal in the description of the node.
+fn entry<'a>(node: &'a Node, signal: &Signal) -> Option<&'a SignalEntry> {
+    let described = node.model.as_ref()?.description.signals.iter();
+    described.into_iter().find(|entry| entry.name == signal.name && entry.value == signal.value_object.0)
 }

@@ -390,7 +390,8 @@ fn read_units<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<
     let mut refused: BTreeSet<(usize, ObjectId)> = BTreeSet::new();
     for ((at, object), answer) in objects.into_iter().zip(reader.read_optional(&items)?) {
         let node = &nodes[at];
-        let or_else = if object.index == 0x6131 { U32 } else { U8 };
+        let is_unit = wanted.iter().any(|&(of, _, [unit, ..])| of == at && unit == Some(object));
+        let or_else = if is_unit { U32 } else { U8 };
         let data_type = node.layout().data_type(object).unwrap_or(or_else);
         match answer.and_then(|answer| answer.value(node.id, object, Some(data_type))) {
             Ok((value, _)) => drop(values.insert((at, object), value)),

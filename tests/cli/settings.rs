@@ -69,6 +69,26 @@ fn new_unit_rescales_other_values() {
     assert!(answers[at + 1..].contains(&"42306101770D0000"), "{answers:?}");
 }
 
+/// HYDAC VFL, 3.5.2.4: the unit of the device temperature is in 4617h:1; there is no channel 2 of CiA 404.
+#[test]
+fn unit_is_written_to_the_object_of_the_description() {
+    let bench = Bench::of("hydac@1");
+    let fixed =
+        bench.run("unit 1 degF").fails(2, "cangauge: node 1: temperature is in degC, which the device cannot change\n");
+    assert_eq!(fixed.frames_of("601").iter().filter(|frame| frame.starts_with('2')).count(), 0);
+    let description = bench.run("devices show hydac").exit(0).stdout;
+    let at = description.find("at = \"0x4617:1-1\"").expect("the object");
+    let writable = description[at..].replacen("\"ro\"", "\"rw\"", 1);
+    fs::write(bench.path("rw.toml"), format!("{}{writable}", &description[..at])).expect("a description");
+    fs::write(bench.path("bench.toml"), "clock = \"virtual\"\n[[device]]\nkind = \"rw.toml\"\nnode = 1\n")
+        .expect("a bench");
+    let done = bench.run("unit 1 temperature degF --device rw.toml").exit(0);
+    assert!(done.stdout.starts_with("temperature  degC  ->  degF\n"), "{}", done.stdout);
+    let writes = done.frames_of("601").into_iter().filter(|frame| frame.starts_with('2'));
+    assert_eq!(writes.collect::<Vec<_>>(), ["231746010000AC00"]);
+    bench.run("unit 1 degC --device rw.toml").exit(0);
+}
+
 /// MH-4, 4.2.15: NaN, -32768 and -2147483648 mean "no value" in every unit.
 #[test]
 fn an_invalid_value_is_not_converted() {

@@ -329,14 +329,13 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
         }
         Command::Unit { node: id, signal, unit: code } => {
             let mut device = settings::open(master, node(*id), &none)?;
-            unit::set(master, &mut device, *signal, Unit(*code))?;
-            match settings::find_signal(&device, *signal) {
-                Ok(signal) => {
-                    let object = ObjectId::new(0x6131, signal.channel);
-                    Claim::Values(vec![(*id, object, code.to_le_bytes().to_vec())])
-                }
-                Err(_) => Claim::Nothing,
-            }
+            let change = unit::set(master, &mut device, *signal, Unit(*code))?;
+            let channel = device.signals.iter().find(|signal| signal.name == change.now.signal);
+            let described = device.model.iter().flat_map(|model| &model.description.signals);
+            let entry = described.into_iter().find(|entry| entry.name == change.now.signal);
+            let of_channel = channel.map(|signal| ObjectId::new(0x6131, signal.channel));
+            let object = entry.and_then(|entry| entry.unit).or(of_channel);
+            object.map_or(Claim::Nothing, |object| Claim::Values(vec![(*id, object, code.to_le_bytes().to_vec())]))
         }
         Command::Filter { node: id, kind, constant } => {
             let device = settings::open(master, node(*id), &none)?;

@@ -332,10 +332,11 @@ impl UnitEntry {
 impl FromToml for UnitEntry {
     fn from_toml(value: &DeValue<'_>) -> Result<UnitEntry, String> {
         let text = text(value)?;
-        let fixed = Unit::from_symbol(text).map(UnitEntry::Fixed);
-        let object = || text.parse().ok().filter(|_| text.starts_with(|first: char| first.is_ascii_digit()));
+        // `0x2131` is an object, `0x004E0000` is too long for one and is a unit code.
+        let object = text.parse().ok().filter(|_| text.starts_with(|first: char| first.is_ascii_digit()));
+        let fixed = || Unit::from_symbol(text).map(UnitEntry::Fixed);
         let unknown = || format!("\"{text}\" is neither a known unit (bar, degC, l/h, %) nor an object (0x6131:1)");
-        fixed.or_else(|| object().map(UnitEntry::At)).ok_or_else(unknown)
+        object.map(UnitEntry::At).or_else(fixed).ok_or_else(unknown)
     }
 }
 

@@ -87,7 +87,10 @@ pub fn select_signals(node: &Node, text: &str, is_selected: impl Fn(&Signal) -> 
             }
             _ if position(item).is_none() && item == "all" => channels.clone(),
             Some(range) if position(item).is_none() => channels[range].to_vec(),
-            _ => vec![find_signal(node, Some(item))?],
+            _ => match super::read::find(node, item)? {
+                signal if is_selected(signal) => vec![signal],
+                _ => vec![find_signal(node, Some(item))?],
+            },
         };
         for signal in found {
             if !names.contains(&signal.name) {

@@ -1,4 +1,4 @@
-//! The physical unit of a signal (6131h), and the objects that are converted to a new unit.
+//! The physical unit of a signal (6131h, or the object in the description), and the objects that are converted to a new unit.
 
 use super::{SettingsFact, SettingsFailure, ValueWithUnit, find_signal, measured_quantity, read_each, set_object};
 use crate::canopen::id::NodeId;
@@ -9,7 +9,9 @@ use crate::master::Master;
 use crate::measure::layout::Signal;
 use crate::measure::sample::Number;
 use crate::node::Node;
+use crate::node::signals::{unit_and_digits, unit_object};
 use crate::node::survey::narrow_values;
+use crate::tasks::read::find;
 use crate::tasks::{Fact, Failure, Note};
 
 /// The unit of a signal.
@@ -86,8 +88,8 @@ const IN_UNIT: [(u16, Scale); 10] = [
 /// No such signal; [`SettingsFailure::NoUnit`].
 pub fn show(node: &Node, signal: Option<&str>) -> Result<Vec<UnitOf>, Failure> {
     let signals: Vec<&Signal> = match signal {
-        Some(name) => vec![find_signal(node, Some(name))?],
-        None => node.channels(),
+        Some(name) => vec![find(node, name)?],
+        None => node.signals.iter().filter(|signal| unit_object(node, signal).is_some()).collect(),
     };
     let units: Vec<UnitOf> = signals.iter().filter_map(|signal| unit_of(node, signal)).collect();
     if units.is_empty() {
@@ -97,14 +99,14 @@ pub fn show(node: &Node, signal: Option<&str>) -> Result<Vec<UnitOf>, Failure> {
 }
 
 fn unit_of(node: &Node, signal: &Signal) -> Option<UnitOf> {
-    let object = ObjectId::new(0x6131, signal.channel);
-    let allowed = node.described(object).map_or(&[][..], |entry| &entry.allow);
+    let object = unit_object(node, signal);
+    let allowed = object.and_then(|object| node.described(object)).map_or(&[][..], |entry| &entry.allow);
     Some(UnitOf {
         node: node.id,
         signal: signal.name.clone(),
         unit: signal.unit?,
         takes: allowed.iter().map(|code| Unit(code.low)).collect(),
-        fixed: node.is_read_only(object),
+        fixed: object.is_none_or(|object| node.is_read_only(object)),
     })
 }
 
@@ -115,7 +117,6 @@ fn unit_of(node: &Node, signal: &Signal) -> Option<UnitOf> {
 /// unit.
 pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit: Unit) -> Result<UnitChange, Failure> {
     let signal = choose(node, signal, unit)?.clone();
-    let object = ObjectId::new(0x6131, signal.channel);
     let Some(old) = unit_of(node, &signal) else {
         return Err(Failure::at(node.id, SettingsFailure::NoUnit { signal: Some(signal.name) }));
     };
@@ -125,7 +126,7 @@ pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit:
         let notes = vec![Note::of_node(node.id, fact)];
         return Ok(UnitChange { before: unit, now: old, rescaled: Vec::new(), notes });
     }
-    check_accepted(node, &old, unit).map_err(|failure| failure.of_object(object))?;
+    let object = check_accepted(node, &signal, &old, unit)?;
     let objects = in_unit(node, &signal);
     let addresses: Vec<ObjectId> = objects.iter().map(|&(object, _)| object).collect();
     let before = read_each(master, node, &addresses)?;
@@ -154,23 +155,28 @@ pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit:
     Ok(UnitChange { before: old.unit, now: UnitOf { unit, ..old }, rescaled, notes })
 }
 
-/// Checks that the description allows the new unit.
-fn check_accepted(node: &Node, old: &UnitOf, unit: Unit) -> Result<(), Failure> {
-    let signal = old.signal.clone();
+/// Checks that the description allows the new unit. Returns the object to write.
+fn check_accepted(node: &Node, signal: &Signal, old: &UnitOf, unit: Unit) -> Result<ObjectId, Failure> {
+    let name = old.signal.clone();
+    let fixed = SettingsFailure::UnitFixed { signal: name.clone(), unit: old.unit };
+    let Some(object) = unit_object(node, signal) else { return Err(Failure::at(node.id, fixed)) };
     if old.fixed {
-        return Err(Failure::at(node.id, SettingsFailure::UnitFixed { signal, unit: old.unit }));
+        return Err(Failure::at(node.id, fixed).of_object(object));
     }
     if !old.takes.is_empty() && !old.takes.contains(&unit) {
-        let accepted = old.takes.clone();
-        return Err(Failure::at(node.id, SettingsFailure::UnitNotAccepted { signal, unit, accepted }));
+        let failure = SettingsFailure::UnitNotAccepted { signal: name, unit, accepted: old.takes.clone() };
+        return Err(Failure::at(node.id, failure).of_object(object));
     }
-    Ok(())
+    Ok(object)
 }
 
 /// Reads the decimal digits again, because they may change with the unit.
 fn digits(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Option<u8>, Failure> {
-    let object = ObjectId::new(0x6132, signal.channel);
-    let value = if node.may_have(object) { read_each(master, node, &[object])?.pop().flatten() } else { None };
+    let [_, object] = unit_and_digits(node, signal);
+    let value = match object.filter(|&object| node.may_have(object)) {
+        Some(object) => read_each(master, node, &[object])?.pop().flatten(),
+        None => None,
+    };
     let digits = value.as_ref().and_then(Value::as_u64).and_then(|number| u8::try_from(number).ok());
     Ok(digits.or(signal.digits))
 }
@@ -187,13 +193,12 @@ pub fn is_alike(signal: &Signal, unit: Unit) -> bool {
 
 /// The signal with this name; without a name the only signal with a unit of the same quantity.
 fn choose<'a>(node: &'a Node, name: Option<&str>, unit: Unit) -> Result<&'a Signal, Failure> {
-    if name.is_none() {
-        let mut alike = node.signals.iter().filter(|signal| is_alike(signal, unit));
-        if let (Some(only), None) = (alike.next(), alike.next()) {
-            return Ok(only);
-        }
+    let mut alike = node.signals.iter().filter(|signal| is_alike(signal, unit));
+    match (name, alike.next(), alike.next()) {
+        (Some(name), ..) => find(node, name),
+        (None, Some(only), None) => Ok(only),
+        (None, ..) => find_signal(node, None),
     }
-    find_signal(node, name)
 }
 
 /// The objects in the unit of a signal.
@@ -203,11 +208,12 @@ fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, Scale)> {
     // Without a description, only the family of the process value is read.
     let own = signal.value_object.0.index & 0xf000;
     let families = [0x6000, 0x7000, 0x8000, 0x9000].into_iter().filter(|&family| has_description || family == own);
-    let standard = IN_UNIT.into_iter().flat_map(move |(low, scale)| {
+    let in_unit = IN_UNIT.into_iter().filter(|_| signal.has_channel());
+    let standard = in_unit.flat_map(move |(low, scale)| {
         families.clone().map(move |family| (ObjectId::new(family | low, channel), scale))
     });
     let also = signal.other_objects.iter().map(|&object| (object, Scale::Moving));
-    let offset = std::iter::once((ObjectId::new(0x6127, channel), Scale::Distance));
+    let offset = signal.has_channel().then(|| (ObjectId::new(0x6127, channel), Scale::Distance));
     let described = node.model.as_ref().map_or(&[][..], |model| &model.description.objects).iter();
     let described = described.filter(|entry| entry.follows_unit == Some(channel));
     let described = described.flat_map(|entry| entry.objects());

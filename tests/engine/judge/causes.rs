@@ -124,6 +124,10 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
         ]
         .iter()
         .any(|part| message.contains(part))
+        // The temperature of this device is in none of its TPDOs.
+        || message.contains("temperature")
+            && message.contains("TPDO")
+            && spec.devices.iter().any(|device| device.kind == "hydac")
         // Several devices take one node-ID: allowed by --force, or not detectable.
         || only && spec.devices.len() > 1
         || spec.command.is_lss() && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
