@@ -15,7 +15,7 @@ use std::time::Duration;
 /// The time that `--passive` listens: three heartbeats at the usual interval of 1 s.
 const LISTEN_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// The wait after the last request.
+/// The wait after the last request of the first round.
 pub(super) const SCAN_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// List every node that answers, with its state, identity and recognised device

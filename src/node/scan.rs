@@ -7,7 +7,7 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::{Life, NmtState};
 use crate::canopen::object::ObjectId;
-use crate::master::{Error, Happening, Master, Request, SdoError, SdoFailure, Ticket};
+use crate::master::{Answer, Error, Happening, Master, Request, SdoError, SdoFailure, Ticket};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -17,10 +17,14 @@ const FULL_QUEUE_BITS: u64 = 10 * 2 * 135;
 
 const VENDOR: ObjectId = ObjectId::new(0x1018, 1);
 
-/// The time from the first requests to their repetition.
+/// The time from the last request of a round to the next round. After the last round, at least this time is left for
+/// answers.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(50);
 
-/// How long to wait for heartbeats after the last requests.
+/// How often the master checks whether all requests were sent.
+const SENDING_STEP: Duration = Duration::from_millis(2);
+
+/// How long to wait for heartbeats after the first requests.
 const HEARTBEAT_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// The nodes that showed themselves.
@@ -58,6 +62,20 @@ impl Presence {
             Happening::Fault(fault, _) => self.on_fault(*fault),
             _ => {}
         }
+    }
+
+    /// The end of a request to this node.
+    fn on_result(&mut self, result: Result<Answer, SdoError>, node: Option<NodeId>, is_only: bool) {
+        let has_answered = result.as_ref().map_or_else(
+            |error| !matches!(error.failure, SdoFailure::NoAnswer { .. } | SdoFailure::Cancelled),
+            |_| true,
+        );
+        self.answered.extend(node.filter(|_| has_answered));
+        let has_frame = |error: &SdoError| match error.failure {
+            SdoFailure::NoAnswer { missed, .. } => is_only && missed.frame.is_some(),
+            _ => false,
+        };
+        self.other_channel = result.err().filter(has_frame);
     }
 
     /// Adds a fault of the controller.
@@ -113,8 +131,8 @@ fn tpdo_node(id: CanId) -> Option<NodeId> {
 /// because some devices do not answer one of them.
 ///
 /// A heartbeat, a boot-up message or a late answer also counts. Nodes without an answer are asked
-/// `rounds` times; `timeout` is the wait after the last request. If states are unknown, waits at least 200 ms after the
-/// last requests.
+/// `rounds` times. All rounds share one wait: `timeout` after the last request of the first round. If states are
+/// unknown, waits at least 200 ms after this request.
 ///
 /// The caller sets the filters: with [`Master::listen_to`] no TPDOs are received.
 ///
@@ -123,76 +141,70 @@ fn tpdo_node(id: CanId) -> Option<NodeId> {
 pub fn find(master: &mut Master<'_>, nodes: &[NodeId], timeout: Duration, rounds: u32) -> Result<Presence, Error> {
     // On a slow bus a request stays in the queue for longer than the time-out.
     let bit_rate = master.bus().bit_rate().filter(|&rate| rate > 0);
-    let queue = bit_rate.map_or(0, |rate| FULL_QUEUE_BITS * 1_000_000 / u64::from(rate));
-    let timeout = timeout + Duration::from_micros(queue);
+    let queue = Duration::from_micros(bit_rate.map_or(0, |rate| FULL_QUEUE_BITS * 1_000_000 / u64::from(rate)));
+    let timeout = timeout + queue;
     let mut presence = Presence::default();
-    let mut asked_at = master.now();
     let rounds = rounds.max(1);
-    // One more round, for nodes that were booting and missed the request.
-    for round in 0..=rounds {
-        let is_missing =
-            |node: &&NodeId| !presence.answered.contains(node) && (round < rounds || presence.booted.contains(node));
-        let missing: Vec<NodeId> = nodes.iter().filter(is_missing).copied().collect();
-        if missing.is_empty() {
-            continue;
-        }
-        asked_at = master.now();
-        let object = if round == 0 { ObjectId::DEVICE_TYPE } else { VENDOR };
-        ask(master, (&missing, object), timeout, round + 1 >= rounds, &mut presence)?;
+    let asked_at = ask(master, (nodes, ObjectId::DEVICE_TYPE), timeout, &mut presence, |asked_at| match rounds {
+        1 => asked_at + timeout,
+        _ => asked_at + REPEAT_INTERVAL,
+    })?;
+    let end = asked_at + timeout;
+    for round in 1..rounds {
+        let missing = without_answer(nodes, &presence, |_| true);
+        let within = end.since(master.now()).max(REPEAT_INTERVAL + queue);
+        ask(master, (&missing, VENDOR), within, &mut presence, |asked_at| match round + 1 < rounds {
+            true => asked_at + REPEAT_INTERVAL,
+            false => end.max(asked_at + REPEAT_INTERVAL + queue),
+        })?;
     }
+    // Once more, for nodes that were booting and missed the requests.
+    let booted = without_answer(nodes, &presence, |node| presence.booted.contains(&node));
+    ask(master, (&booted, VENDOR), timeout, &mut presence, |asked_at| asked_at + timeout)?;
     wait_for_states(master, asked_at + timeout.min(HEARTBEAT_TIMEOUT), &mut presence)?;
     Ok(presence)
 }
 
-/// Asks nodes once, and waits for their answers: in the last round until the time-out, else until the next repetition.
+fn without_answer(nodes: &[NodeId], presence: &Presence, is_wanted: impl Fn(NodeId) -> bool) -> Vec<NodeId> {
+    nodes.iter().copied().filter(|&node| !presence.answered.contains(&node) && is_wanted(node)).collect()
+}
+
+/// Asks nodes once, and waits for their answers until `end`, which depends on the moment when the last request was
+/// sent. Returns this moment.
 fn ask(
     master: &mut Master<'_>,
     (nodes, object): (&[NodeId], ObjectId),
     timeout: Duration,
-    is_last: bool,
     presence: &mut Presence,
-) -> Result<(), Error> {
+    end: impl Fn(Mono) -> Mono,
+) -> Result<Mono, Error> {
+    let mut asked_at = master.now();
     let mut open: BTreeMap<Ticket, NodeId> = BTreeMap::new();
     for &node in nodes {
         open.insert(master.start(Request::read(node, object).once().within(timeout)), node);
     }
-    let begin = master.now();
-    let mut until = begin + REPEAT_INTERVAL;
-    if is_last {
-        until = until + timeout * 10 + Duration::from_secs(10);
-    }
-    loop {
-        let waited = wait(master, until, Policy::Command, |_, event| {
+    let (mut is_sending, mut until) = (true, asked_at);
+    while !open.is_empty() {
+        let step = if is_sending { master.now() + SENDING_STEP } else { until };
+        let waited = wait(master, step, Policy::Command, |master, event| {
             match event {
-                Happening::Sdo(ticket, result) => {
-                    let has_answered = result.as_ref().map_or_else(
-                        |error| !matches!(error.failure, SdoFailure::NoAnswer { .. } | SdoFailure::Cancelled),
-                        |_| true,
-                    );
-                    let node = open.remove(&ticket).filter(|_| has_answered);
-                    presence.answered.extend(node);
-                    let has_frame = |error: &SdoError| match error.failure {
-                        SdoFailure::NoAnswer { missed, .. } => nodes.len() == 1 && missed.frame.is_some(),
-                        _ => false,
-                    };
-                    presence.other_channel = result.err().filter(has_frame);
-                    if open.is_empty() {
-                        return ControlFlow::Break(());
-                    }
-                }
+                Happening::Sdo(ticket, result) => presence.on_result(result, open.remove(&ticket), nodes.len() == 1),
                 event => presence.on_event(&event),
             }
-            ControlFlow::Continue(())
+            let is_sent = is_sending && !master.is_sending();
+            if open.is_empty() || is_sent { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
-        // On a slow bus the requests are still being sent.
-        let is_sending = waited == super::wait::Waited::Deadline && !is_last && master.is_sending();
-        if !is_sending {
+        if is_sending {
+            asked_at = master.now();
+            is_sending = master.is_sending();
+            // The time-out of the only request also shows a frame that looks like its answer.
+            until = if nodes.len() == 1 { end(asked_at) + SENDING_STEP } else { end(asked_at) };
+        } else if waited.done().is_none() {
             break;
         }
-        until = until + REPEAT_INTERVAL;
     }
     master.forget(open.keys().copied());
-    Ok(())
+    Ok(asked_at)
 }
 
 /// Waits for the heartbeats of the nodes that answered.

@@ -38,7 +38,7 @@ impl Found {
 /// Reads the device type of every node in parallel, then the identity of those that answer.
 ///
 /// Heartbeats and boot-up messages also show nodes, for example stopped nodes that cannot answer. Nodes without an
-/// answer are asked `rounds` times in total; `timeout` is the wait after the last request.
+/// answer are asked `rounds` times in total; `timeout` is the wait after the last first request.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C. If there is no node, the list is empty.

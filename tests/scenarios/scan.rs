@@ -12,10 +12,14 @@ use cangauge::master::{Master, OnTwoDevices, Timing};
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, Setup};
 use cangauge::tasks::scan::{Found, scan};
+use std::collections::VecDeque;
 use std::path::Path;
 use std::time::Duration;
 
 const WAIT: Duration = Duration::from_millis(200);
+
+/// The time to read the identity of one device.
+const READING: Duration = Duration::from_millis(30);
 
 fn ids(nodes: impl IntoIterator<Item = u8>) -> Vec<NodeId> {
     nodes.into_iter().map(|node| NodeId::new(node).unwrap()).collect()
@@ -40,10 +44,11 @@ fn scan_ends_when_all_requested_nodes_have_answered() {
         assert_eq!(found.len(), 1);
         assert!(took < Duration::from_millis(300), "{took:?}");
     }
-    // Silent nodes are asked twice: the first wait is short, the second is the time-out.
+    // Silent nodes are asked twice. Both rounds share one wait, after the 127 requests of the first one.
     let (found, took) = scanned(&mut bus, &ids(1..=127), WAIT);
     assert_eq!(found.len(), 1);
-    assert!((WAIT..WAIT * 3).contains(&took), "{took:?}");
+    let sending = Duration::from_millis(65);
+    assert!((WAIT..WAIT + sending + READING).contains(&took), "{took:?}");
 }
 
 #[test]
@@ -151,7 +156,7 @@ impl Station for Late {
 
 #[test]
 fn node_switched_on_during_the_scan_is_found() {
-    for millis in [1, 30, 100, 200, 240] {
+    for millis in [1, 30, 100, 150, 199] {
         let device = Device::new(Setup::new(by_name("mh4").unwrap(), NodeId::new(5).unwrap())).unwrap();
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.attach(Late { device, at: Mono::at(Duration::from_millis(millis)), is_on: false });
@@ -159,4 +164,60 @@ fn node_switched_on_during_the_scan_is_found() {
         let names: Vec<_> = found.iter().map(|found| found.device.identity.name.as_deref()).collect();
         assert_eq!(names, [Some("MH-4-CAN")], "switched on after {millis} ms");
     }
+}
+
+/// A device that answers each request after a fixed time.
+struct Slow {
+    device: Device,
+    delay: Duration,
+    requests: VecDeque<(Mono, Frame)>,
+}
+
+impl Station for Slow {
+    fn power_on(&mut self, now: Mono, out: &mut Outbox) {
+        self.device.power_on(now, out);
+    }
+
+    fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
+        self.requests.push_back((now + self.delay, *frame));
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        while let Some(&(at, frame)) = self.requests.front()
+            && at <= now
+        {
+            self.requests.pop_front();
+            self.device.receive(now, &frame, out);
+        }
+        self.device.wake(now, out);
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.requests.front().map(|(at, _)| *at).into_iter().chain(self.device.next_wake()).min()
+    }
+
+    fn sent(&mut self, now: Mono, frame: &Frame) {
+        self.device.sent(now, frame);
+    }
+}
+
+#[test]
+fn slow_nodes_are_found_in_the_same_wait() {
+    for delay in [1, 49, 51, 100, 150, 190] {
+        for node in [1, 60, 127] {
+            let device = Device::new(Setup::new(by_name("dps").unwrap(), NodeId::new(node).unwrap())).unwrap();
+            let mut bus = MemoryBus::new(Clock::Virtual);
+            bus.attach(Slow { device, delay: Duration::from_millis(delay), requests: VecDeque::new() });
+            let (found, _) = scanned(&mut bus, &ids(1..=127), WAIT);
+            let names: Vec<_> = found.iter().map(|found| found.device.identity.name.as_deref()).collect();
+            assert_eq!(names, [Some("DPS")], "node {node}, {delay} ms");
+        }
+    }
+}
+
+#[test]
+fn none_of_127_nodes_is_missed() {
+    let devices: String = (1..=127).map(|node| format!("[[device]]\nkind = \"dps\"\nnode = {node}\n")).collect();
+    let (found, _) = scanned(&mut bench(&devices), &ids(1..=127), WAIT);
+    assert_eq!(found.iter().filter(|found| found.device.identity.serial.is_some()).count(), 127);
 }
