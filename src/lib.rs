@@ -22,8 +22,9 @@
 //!   without the encoders of the client.
 //! - [`tasks`] → node, measure, master, device, canopen, bus (the trait). The procedures of the commands: set a
 //!   node-ID, map a TPDO, record, check. They return typed reports and typed failures, and print nothing.
-//! - [`output`] → tasks (reports), node, measure, device, canopen (values), bus (moments, faults). All sentences,
-//!   tables and file formats. Part of the feature `cli`.
+//! - [`publish`] → bus (files, moments, interrupts). The form of recorded rows outside of the bench: line protocol.
+//! - [`output`] → tasks (reports), publish (reports), node, measure, device, canopen (values), bus (moments, faults).
+//!   All sentences, tables and file formats. Part of the feature `cli`.
 //! - [`cli`] → tasks, output, node, measure, master, sim, bus, device, canopen (values). Arguments and help texts, one
 //!   file for each command. Part of the feature `cli`.
 //!
@@ -114,5 +115,6 @@ pub mod node;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod output;
+pub mod publish;
 pub mod sim;
 pub mod tasks;

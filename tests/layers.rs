@@ -20,7 +20,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("master", &["bus", "canopen", "device"]),
     ("measure", &["bus", "canopen", "device"]),
     ("node", &["bus", "canopen", "device", "master", "measure"]),
-    ("output", &["bus", "canopen", "device", "measure", "node", "tasks"]),
+    ("output", &["bus", "canopen", "device", "measure", "node", "publish", "tasks"]),
+    ("publish", &["bus"]),
     ("sim", &["bus", "canopen", "device"]),
     ("tasks", &["bus", "canopen", "device", "master", "measure", "node"]),
 ];
@@ -101,6 +102,7 @@ const PRINTING: [&str; 5] = ["print", "println", "eprint", "eprintln", "dbg"];
 /// The files with `unsafe`: how often it occurs, and why.
 const UNSAFE: &[(&str, usize, &str)] = &[
     ("bus/claim/holder.rs", 1, "SO_PEERCRED: std has no stable call for the credentials of a peer"),
+    ("bus/host.rs", 1, "gethostname: std does not know the host name"),
     ("bus/interrupt.rs", 2, "sigaction and signal: std can neither read nor set the action of a signal"),
     ("bus/poll.rs", 2, "ppoll and poll: std cannot wait for a descriptor"),
     ("bus/replay/text.rs", 2, "mktime and its zeroed argument: std knows no time zones"),

@@ -9,6 +9,7 @@ pub mod coded;
 mod delegate;
 pub mod faults;
 pub mod file;
+pub mod host;
 pub mod interrupt;
 pub mod memory;
 mod own_clock;

@@ -195,6 +195,34 @@ impl FromStr for BusSpec {
     }
 }
 
+impl BusSpec {
+    /// A short name for the bench: `can0`, `sim`, `replay`; the last part of the name of an adapter.
+    pub(super) fn short_name(&self) -> String {
+        match self {
+            BusSpec::SocketCan(name) => name.clone(),
+            BusSpec::Sim(_) => "sim".to_owned(),
+            BusSpec::Replay(_) => "replay".to_owned(),
+            BusSpec::Remote(remote) => {
+                let name = remote.to_string();
+                let name = name.split('@').next().unwrap_or_default();
+                name.rsplit('/').next().unwrap_or_default().to_owned()
+            }
+        }
+    }
+}
+
+impl fmt::Display for BusSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            BusSpec::SocketCan(name) => f.write_str(name),
+            BusSpec::Sim(None) => f.write_str("sim"),
+            BusSpec::Sim(Some(bench)) => write!(f, "sim:{bench}"),
+            BusSpec::Replay(file) => write!(f, "replay:{file}"),
+            BusSpec::Remote(remote) => remote.fmt(f),
+        }
+    }
+}
+
 impl ValueEnum for Format {
     fn value_variants<'a>() -> &'a [Format] {
         CHOICES
@@ -203,6 +231,61 @@ impl ValueEnum for Format {
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.name()))
     }
+}
+
+/// A tag: `part=P107`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tag {
+    /// The name.
+    pub key: String,
+    /// The value.
+    pub value: String,
+}
+
+/// The longest name and the longest value of a tag, in bytes.
+const LONGEST_TAG: (usize, usize) = (64, 256);
+
+/// Names that have another meaning in a recording or at its receiver.
+const RESERVED_TAGS: [&str; 12] =
+    ["time", "elapsed_s", "node", "signal", "value", "unit", "status", "raw", "run", "row", "serial", "name"];
+
+impl FromStr for Tag {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Tag, String> {
+        let (key, value) = text.split_once('=').ok_or_else(|| format!("\"{text}\" is not a tag (part=P107)"))?;
+        let is_name = key.starts_with(|first: char| first.is_ascii_alphabetic())
+            && key.len() <= LONGEST_TAG.0
+            && key.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'-');
+        if !is_name {
+            return Err(format!("\"{key}\" is not a name of a tag (a letter, then letters, digits, _ or -)"));
+        }
+        if RESERVED_TAGS.contains(&key) {
+            return Err(format!("the name \"{key}\" has another meaning in recordings: choose another tag"));
+        }
+        if value.is_empty() || value.len() > LONGEST_TAG.1 {
+            return Err(format!("the value of the tag \"{key}\" must have 1 to {} bytes", LONGEST_TAG.1));
+        }
+        if value.contains(|letter: char| letter.is_control() || letter == '\\') {
+            return Err(format!("the value of the tag \"{key}\" must not contain \\ or control characters"));
+        }
+        Ok(Tag { key: key.to_owned(), value: value.to_owned() })
+    }
+}
+
+/// The tags as pairs.
+///
+/// # Errors
+/// The first name that occurs twice.
+pub(super) fn tag_pairs(tags: &[Tag]) -> Result<Vec<(String, String)>, String> {
+    let mut pairs: Vec<(String, String)> = Vec::new();
+    for Tag { key, value } in tags {
+        if pairs.iter().any(|(known, _)| known == key) {
+            return Err(format!("the tag \"{key}\" is given twice"));
+        }
+        pairs.push((key.clone(), value.clone()));
+    }
+    Ok(pairs)
 }
 
 /// The name of an interface: `can0`, `socketcan:can0`.

@@ -3,6 +3,7 @@
 mod files;
 mod finish;
 mod recorder;
+mod run_file;
 
 use super::args::{Duration, Nodes, SignalArg};
 use super::recording::{poll_interval, print_verdicts, refuse_to_send, request_interval, sync_interval};
@@ -29,7 +30,7 @@ use finish::{Ended, Finished, wait_for_writers};
 use recorder::Recorder;
 use std::io::{self, IsTerminal};
 
-/// Record measurements as CSV or JSON Lines
+/// Record measurements as CSV, JSON Lines or InfluxDB line protocol
 ///
 /// Without --sync, --poll and --request, log records the TPDOs as the nodes send them. It starts sensors that are not
 /// known to be operational, unless another NMT master is seen. At the end it restores their previous NMT states, if
@@ -63,6 +64,8 @@ Examples:
   cangauge -b sim log 127 --duration 5s -o dps.csv
   cangauge -b sim log 1-3,127 pressure --poll 200ms --duration 5s --format json
   cangauge -b sim log 1,127 --sync 10ms --layout wide --duration 5s -o wide.csv
+  cangauge -b sim log 127 --duration 5s --tag bench=3 --tag part=P107 -o p107.csv
+  cangauge -b sim log 127 --duration 5s --format influx
   cangauge log 5 --request 100ms --count 20
   cangauge log 1 --sync 10ms -o run.csv --rotate 1h --events events.csv
   cangauge log 5 --passive --device mh4 -o run.csv --append")]
@@ -163,10 +166,11 @@ impl Log {
             let mut options = self.options(master, global, nodes, is_live)?;
             options.duration = options.duration.map(|duration| duration.saturating_sub(files.waited));
             let waits = master.bus().waits();
+            let run = files.start_run(&open::spec(global)?, master.bus().now().wall);
             let mut recorder =
                 Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
-            recorder.counts.duration = self.duration.map(|duration| duration.0);
-            recorder.counts.count = self.count;
+            recorder.run = run;
+            (recorder.counts.duration, recorder.counts.count) = (self.duration.map(|duration| duration.0), self.count);
             recorder.plot = self.plot.then(|| Recording::new(TimeBase::Clock));
             // Without --poll, the nodes are free for other processes as soon as the recording runs.
             recorder.claims = self.poll.is_none().then(|| std::mem::take(claims));

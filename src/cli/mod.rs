@@ -150,7 +150,7 @@ pub struct Global {
     #[arg(long, global = true)]
     pub(crate) accept_mismatch: bool,
 
-    /// Output format: text, JSON Lines or CSV; for log, text means csv
+    /// Output format: text, JSON Lines or CSV; for log, text means csv, and influx is line protocol
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
     pub(crate) format: Format,
 

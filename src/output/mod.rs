@@ -38,6 +38,7 @@ pub mod recording;
 pub mod replay;
 pub mod report;
 pub mod rows;
+pub mod run_file;
 pub mod scan;
 pub mod sdo;
 pub mod settings;

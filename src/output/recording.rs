@@ -7,8 +7,8 @@ use super::rows::LONG_COLUMNS;
 use crate::bus::{Mono, Stamp};
 use crate::measure::interval::IntervalTracker;
 use crate::measure::sample::{Sample, Source, Status};
-use cells::{Cells, Clock, LongRow, WideRow, decimal, micros, text};
-use std::borrow::Cow;
+use crate::publish::cells::{Cells, text, wide_column};
+use cells::{Clock, LongRow, WideRow, decimal, micros};
 use std::io::{self, BufRead};
 use std::time::Duration;
 
@@ -363,13 +363,17 @@ fn header(line: &[u8]) -> Option<Table> {
         return None;
     }
     let names: Vec<String> = Cells::new(line, delimiter).map(|cell| text(&cell).into_owned()).collect();
-    if names == LONG_COLUMNS {
+    // Tags (log --tag) follow the other columns. Their names contain no dot.
+    if names.starts_with(&LONG_COLUMNS.map(str::to_owned)) {
         return Some(Table::Long(delimiter));
     }
     if names == events::COLUMNS {
         return Some(Table::Events(delimiter));
     }
-    let [time, elapsed, pairs @ ..] = names.as_slice() else { return None };
+    let is_tag =
+        |name: &&String| name.starts_with(|first: char| first.is_ascii_alphabetic()) && *name != LONG_COLUMNS[1];
+    let tags = names.iter().rev().take_while(is_tag);
+    let [time, elapsed, pairs @ ..] = &names[..names.len() - tags.count()] else { return None };
     if (time.as_str(), elapsed.as_str()) != (LONG_COLUMNS[0], LONG_COLUMNS[1]) || !pairs.len().is_multiple_of(2) {
         return None;
     }
@@ -378,13 +382,6 @@ fn header(line: &[u8]) -> Option<Table> {
         (pair[1] == format!("{node}.{signal}.status")).then(|| (node, signal.to_owned(), unit.to_owned()))
     });
     Some(Table::Wide(delimiter, columns.collect::<Option<Vec<_>>>()?))
-}
-
-/// Node, signal and unit of `5.pressure [bar]`.
-fn wide_column(name: &str) -> Option<(u8, &str, &str)> {
-    let (node, rest) = name.split_once('.')?;
-    let (signal, unit) = rest.strip_suffix(']').and_then(|rest| rest.rsplit_once(" [")).unwrap_or((rest, ""));
-    Some((node.parse().ok()?, signal, unit))
 }
 
 fn point(at: i64, value: &[u8], word: &[u8]) -> Option<Point> {
@@ -402,9 +399,6 @@ fn status(word: &[u8]) -> Option<Option<Status>> {
     }
     MARKED.into_iter().find(|status| status.as_str().as_bytes() == word).map(Some)
 }
-
-/// A cell of a row.
-type CellBytes<'a> = Cow<'a, [u8]>;
 
 #[cfg(test)]
 mod tests;

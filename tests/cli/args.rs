@@ -47,7 +47,7 @@ fn wrong_arguments_are_explained() {
     assert_eq!(first("log 1 --sync 10us"), "cangauge: \"10us\" is too short for SYNC (1ms or more)");
     assert_eq!(
         first("read 1 --format xml"),
-        "cangauge: invalid value 'xml' for '--format <FORM>' [possible values: text, json, csv]"
+        "cangauge: invalid value 'xml' for '--format <FORM>' [possible values: text, json, csv, influx]"
     );
     assert_eq!(
         first("log 1 --sync 1s --poll 1s"),

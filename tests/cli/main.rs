@@ -24,6 +24,7 @@ mod log_file;
 mod log_layout;
 mod log_rotate;
 mod log_stall;
+mod log_tags;
 mod lss;
 mod monitor;
 mod nmt;
@@ -158,12 +159,14 @@ impl Bench {
         fs::read_to_string(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// The other files in the folder.
+    /// The other files in the folder, without the files of runs (`run.csv.run.json`).
     fn files(&self) -> Vec<String> {
         let entries = fs::read_dir(self.folder.path()).expect("the folder");
         let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
-        let mut names: Vec<String> =
-            names.filter(|name| !["bench.toml", "trace", "truth.csv"].contains(&name.as_str())).collect();
+        let is_other = |name: &String| {
+            !["bench.toml", "trace", "truth.csv"].contains(&name.as_str()) && !name.ends_with(".run.json")
+        };
+        let mut names: Vec<String> = names.filter(is_other).collect();
         names.sort();
         names
     }

@@ -1,7 +1,10 @@
 //! The output files of `cangauge log`, and their format.
 
+use super::super::args::{BusSpec, Tag, tag_pairs};
 use super::super::exit::{FileError, open_stdout};
 use super::super::file::{Existing, OutFile, ReportFile, lock_output};
+use super::run_file::{RunFile, new_run, run_file_name};
+use crate::bus::Wall;
 use crate::output::events::Events;
 use crate::output::failure::ErrorMessage;
 use crate::output::rows::{
@@ -43,6 +46,9 @@ pub(super) struct Files {
     /// Write the summary as JSON to a file; - for stdout. Without --append, an existing file is replaced
     #[arg(long, value_name = "FILE")]
     pub(super) summary: Option<PathBuf>,
+    /// Add a constant column at the end of each row: bench=3, part=P107. Can be repeated
+    #[arg(long, value_name = "K=V")]
+    tag: Vec<Tag>,
     /// Delimiter of CSV: , ; | or tab [default: ,]
     #[arg(long, value_name = "CHAR")]
     delimiter: Option<Delimiter>,
@@ -144,6 +150,8 @@ pub(super) struct OpenFiles {
     pub(super) events: Option<OutFile>,
     pub(super) summary: Option<ReportFile>,
     series: Option<Series>,
+    /// The file of the run, if the rows go to a regular file.
+    run: Option<ReportFile>,
     /// The name from which the names of rotated files follow. With --force, further files may be older.
     rotated: Option<PathBuf>,
     setup: Setup,
@@ -172,8 +180,13 @@ impl Files {
         }
         let of_csv = self.delimiter.is_some() || self.decimal.is_some() || self.bom;
         if !format.is_csv() && of_csv {
-            return refuse("--delimiter, --decimal and --bom are for CSV", "omit --format json or these options");
+            let hint = format!("omit --format {} or these options", format.name());
+            return refuse("--delimiter, --decimal and --bom are for CSV", &hint);
         }
+        if !format.has_time_forms() && self.time != TimeArg::Rfc3339 {
+            return refuse("line protocol has times in nanoseconds", "omit --time");
+        }
+        tag_pairs(&self.tag).map_err(ErrorMessage::usage)?;
         let Dialect { delimiter, decimal, .. } = self.dialect();
         if delimiter == decimal {
             return refuse("the decimal sign and the delimiter must differ", "add --delimiter ';'");
@@ -222,6 +235,7 @@ impl Files {
     ) -> anyhow::Result<OpenFiles> {
         let setup = Setup {
             format,
+            tags: tag_pairs(&self.tag).unwrap_or_default(),
             layout: if self.is_wide() { Layout::Wide } else { Layout::Long },
             dialect: self.dialect(),
             time: self.time(),
@@ -234,6 +248,7 @@ impl Files {
             events: None,
             summary: None,
             series: None,
+            run: None,
             rotated: self.output.clone().filter(|_| self.rotate.is_some() && !self.force),
             setup,
             keep: 0,
@@ -261,6 +276,7 @@ impl Files {
         if let (false, Some(file)) = (self.is_wide(), &opened.rows) {
             opened.setup.check_long().map_err(|mismatch| header_mismatch(file.path(), mismatch))?;
         }
+        self.open_run(&mut opened)?;
         self.open_events(&mut opened, limit)?;
         let summary = self.summary.as_ref().filter(|path| path.as_path() != Path::new("-"));
         if let Some(path) = summary {
@@ -270,6 +286,14 @@ impl Files {
             opened.summary = Some(file);
         }
         Ok(opened)
+    }
+
+    /// Opens the file of the run, if the rows go to a regular file.
+    fn open_run(&self, opened: &mut OpenFiles) -> anyhow::Result<()> {
+        if let (Some(name), true) = (&self.output, opened.rows.as_ref().is_some_and(OutFile::is_regular)) {
+            opened.run = Some(ReportFile::create(&run_file_name(name), self.append, None)?);
+        }
+        Ok(())
     }
 
     /// Opens the file for events. `limit` is the time for all readers of FIFOs.
@@ -334,6 +358,18 @@ impl Files {
 }
 
 impl OpenFiles {
+    /// Starts a run on this bus. Returns the file of the run, if the rows go to a regular file.
+    pub(super) fn start_run(&mut self, bus: &BusSpec, start: Wall) -> Option<RunFile> {
+        let mut run = new_run(bus, &self.setup.tags, start);
+        let origin = [("bench", &run.bench), ("run", &run.run)].map(|(key, value)| (key.to_owned(), value.clone()));
+        let is_new = |(key, _): &(String, String)| self.setup.tags.iter().all(|(known, _)| known != key);
+        self.setup.origin = origin.into_iter().filter(is_new).collect();
+        let (file, rows) = (self.run.take()?, self.rows.as_ref()?);
+        run.file = rows.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
+        run.offset = self.keep;
+        Some(RunFile::new(file, run))
+    }
+
     /// The writer of the rows. If the bus does not wait for the program, a thread writes.
     pub(super) fn rows(&mut self, waits: bool) -> anyhow::Result<Rows> {
         let target = match &self.rows {

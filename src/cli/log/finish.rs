@@ -55,6 +55,7 @@ impl Unwritten {
     /// The error of the file or stream. If rows were lost, prints their number.
     pub(super) fn into_error(self, console: &Console, files: &OpenFiles, lost: u64) -> anyhow::Error {
         let (file, error) = match (self, &files.events) {
+            (Unwritten::Run(error), _) => return error,
             (Unwritten::Events(error), Some(file)) => return file.error(error),
             (Unwritten::Rows(error) | Unwritten::Events(error), _) => (&files.rows, error),
         };

@@ -1,10 +1,12 @@
 //! Writes and shows a recording while it runs.
 
 use super::super::recording::print_event;
+use super::run_file::RunFile;
 use crate::bus::claim::Claims;
 use crate::bus::{Mono, Stamp};
 use crate::canopen::id::NodeId;
 use crate::measure::sample::{Sample, Source};
+use crate::node::Node;
 use crate::output::console::Console;
 use crate::output::events::{EventText, Events, Weight, event_text, file_change_text};
 use crate::output::failure::ErrorMessage;
@@ -26,6 +28,7 @@ const CHECK_INTERVAL: Duration = Duration::from_millis(100);
 pub(super) enum Unwritten {
     Rows(io::Error),
     Events(io::Error),
+    Run(anyhow::Error),
 }
 
 /// Writes rows and events, and shows them.
@@ -35,6 +38,8 @@ pub(super) struct Recorder {
     pub(super) progress: Progress,
     pub(super) console: Console,
     pub(super) error: Option<Unwritten>,
+    /// The file of the run, until the first row.
+    pub(super) run: Option<RunFile>,
     /// The values and events for `--plot`.
     pub(super) plot: Option<Recording>,
     /// The counts for the live view.
@@ -68,6 +73,7 @@ impl Recorder {
             progress,
             console,
             error: None,
+            run: None,
             plot: None,
             counts: LiveCounts { file: file.clone(), ..LiveCounts::default() },
             dropped: 0,
@@ -110,6 +116,14 @@ impl Recorder {
         if let Some(plot) = &mut self.plot {
             let known = samples.iter().filter_map(|sample| Some((sample, sources.get(sample.source)?)));
             known.for_each(|(sample, source)| plot.push(sample, source));
+        }
+        // A program that follows the file finds the run as soon as it finds a row.
+        if let Some(first) = samples.first()
+            && let Some(run) = self.run.take()
+            && let Err(error) = run.write(first.at.wall)
+        {
+            self.error.get_or_insert(Unwritten::Run(error));
+            return ControlFlow::Break(());
         }
         let mut result = self.rows.put(cycle, samples, sources);
         if let (Ok(()), Some(last)) = (&result, samples.last()) {
@@ -165,6 +179,11 @@ impl Recorder {
 }
 
 impl Observer for Recorder {
+    fn begin(&mut self, nodes: &[Node]) -> Result<(), Failure> {
+        self.run.iter_mut().for_each(|run| run.set_nodes(nodes));
+        Ok(())
+    }
+
     fn failed(&mut self, failures: &[Failure]) {
         for failure in failures {
             self.console.warn(&format!("{}: the node is not recorded", ErrorMessage::of(failure).message));

@@ -1,6 +1,5 @@
 //! The cells of recorded rows: text, numbers and times.
 
-use super::CellBytes;
 use serde::de::{Deserialize, Deserializer, Error, IgnoredAny, MapAccess, Visitor};
 use std::borrow::Cow;
 use std::fmt;
@@ -16,47 +15,6 @@ const FEWEST_SECONDS: f64 = 1e7;
 
 /// `2023-11-14T22:13:21`.
 const SECOND_LENGTH: usize = 19;
-
-/// The cells of a line of CSV.
-pub(super) struct Cells<'a> {
-    rest: Option<&'a [u8]>,
-    delimiter: u8,
-}
-
-impl<'a> Cells<'a> {
-    pub(super) fn new(line: &'a [u8], delimiter: u8) -> Cells<'a> {
-        Cells { rest: Some(line), delimiter }
-    }
-}
-
-impl<'a> Iterator for Cells<'a> {
-    type Item = CellBytes<'a>;
-
-    fn next(&mut self) -> Option<CellBytes<'a>> {
-        let rest = self.rest?;
-        let Some(mut quoted) = rest.strip_prefix(b"\"") else {
-            let end = rest.iter().position(|byte| *byte == self.delimiter);
-            self.rest = end.map(|end| &rest[end + 1..]);
-            return Some(Cow::Borrowed(&rest[..end.unwrap_or(rest.len())]));
-        };
-        let mut cell = Vec::new();
-        while let Some(end) = quoted.iter().position(|byte| *byte == b'"') {
-            cell.extend_from_slice(&quoted[..end]);
-            quoted = &quoted[end + 1..];
-            if quoted.first() != Some(&b'"') {
-                break;
-            }
-            cell.push(b'"');
-            quoted = &quoted[1..];
-        }
-        self.rest = quoted.first().filter(|byte| **byte == self.delimiter).map(|_| &quoted[1..]);
-        Some(Cow::Owned(cell))
-    }
-}
-
-pub(super) fn text(cell: &[u8]) -> Cow<'_, str> {
-    String::from_utf8_lossy(cell)
-}
 
 /// A number with a decimal point or comma.
 pub(super) fn decimal(cell: &[u8]) -> Option<f64> {
@@ -193,18 +151,6 @@ impl<'de> Deserialize<'de> for WideRow {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn cells(line: &str) -> Vec<String> {
-        Cells::new(line.as_bytes(), b',').map(|cell| text(&cell).into_owned()).collect()
-    }
-
-    #[test]
-    fn quoted_cells() {
-        assert_eq!(cells("a,,b"), ["a", "", "b"]);
-        assert_eq!(cells("\"a,\"\"b\"\"\",c,"), ["a,\"b\"", "c", ""]);
-        assert_eq!(cells("\"cut, off"), [""; 1]);
-        assert_eq!(cells(""), [""]);
-    }
 
     #[test]
     fn times_in_three_forms() {

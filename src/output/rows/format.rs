@@ -1,12 +1,14 @@
 //! The file formats of a recording. Each format has its own file in this folder.
 
 mod csv;
+mod influx;
 mod json_lines;
 
 use super::row::{Columns, Row};
 use super::setup::Setup;
 use crate::output::report::Format;
 use csv::CsvRows;
+use influx::InfluxRows;
 use json_lines::JsonRows;
 use std::fmt::Debug;
 use std::io;
@@ -19,10 +21,12 @@ pub enum FileFormat {
     Csv,
     /// JSON Lines.
     JsonLines,
+    /// InfluxDB line protocol.
+    Influx,
 }
 
 /// The values of `--format`. A format only for recordings is a [`Format::Recording`].
-pub const CHOICES: &[Format] = &[Format::Text, Format::Json, Format::Csv];
+pub const CHOICES: &[Format] = &[Format::Text, Format::Json, Format::Csv, Format::Recording(FileFormat::Influx)];
 
 impl From<Format> for FileFormat {
     /// Files and pipes use CSV unless another format is requested.
@@ -62,6 +66,7 @@ impl FileFormat {
         match self {
             FileFormat::Csv => "csv",
             FileFormat::JsonLines => "json",
+            FileFormat::Influx => "influx",
         }
     }
 
@@ -70,11 +75,17 @@ impl FileFormat {
         self == FileFormat::Csv
     }
 
+    /// Whether the form of times can be chosen.
+    pub fn has_time_forms(self) -> bool {
+        self != FileFormat::Influx
+    }
+
     /// The writer of this format.
     pub(super) fn writer(self, setup: &Setup) -> Box<dyn RowFormat> {
         match self {
-            FileFormat::Csv => Box::new(CsvRows::new(setup.dialect, setup.time)),
-            FileFormat::JsonLines => Box::new(JsonRows::new(setup.time)),
+            FileFormat::Csv => Box::new(CsvRows::new(setup.dialect, setup.time, &setup.tags)),
+            FileFormat::JsonLines => Box::new(JsonRows::new(setup.time, &setup.tags)),
+            FileFormat::Influx => Box::new(InfluxRows::new(setup)),
         }
     }
 }

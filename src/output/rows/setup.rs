@@ -26,6 +26,10 @@ pub struct Setup {
     pub dialect: Dialect,
     /// The form of times.
     pub time: TimeForm,
+    /// The tags: constant columns after the others, each with its name and its value.
+    pub tags: Vec<(String, String)>,
+    /// The bench and the run: further tags of line protocol.
+    pub origin: Vec<(String, String)>,
     /// When the next file starts.
     pub rotation: Option<Rotation>,
     /// The recording ends after this many rows.

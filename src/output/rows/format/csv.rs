@@ -13,16 +13,26 @@ use std::io;
 pub(super) struct CsvRows {
     dialect: Dialect,
     times: Times,
+    tag_names: Vec<String>,
+    /// The cells of the tags, each after a delimiter.
+    tag_cells: Vec<u8>,
 }
 
 impl CsvRows {
-    pub(super) fn new(dialect: Dialect, time: TimeForm) -> CsvRows {
-        CsvRows { dialect, times: Times::new(time) }
+    pub(super) fn new(dialect: Dialect, time: TimeForm, tags: &[(String, String)]) -> CsvRows {
+        let mut tag_cells = Vec::new();
+        for (_, value) in tags {
+            tag_cells.push(dialect.delimiter);
+            push_text(&mut tag_cells, value, dialect.delimiter);
+        }
+        let tag_names = tags.iter().map(|(name, _)| name.clone()).collect();
+        CsvRows { dialect, times: Times::new(time), tag_names, tag_cells }
     }
 
     fn names(&self, columns: Columns<'_>) -> Vec<u8> {
         let mut line = Vec::new();
-        push_texts(&mut line, columns.names().iter().map(String::as_str), self.dialect.delimiter);
+        let names = columns.names();
+        push_texts(&mut line, names.iter().chain(&self.tag_names).map(String::as_str), self.dialect.delimiter);
         line
     }
 }
@@ -80,6 +90,7 @@ impl RowFormat for CsvRows {
                 }
             }
         }
+        out.extend_from_slice(&self.tag_cells);
         out.push(b'\n');
         Ok(())
     }
@@ -96,12 +107,15 @@ mod tests {
 
     #[test]
     fn only_the_same_columns_may_follow() {
-        let csv = CsvRows::new(Dialect { bom: true, ..Dialect::default() }, TimeForm::default());
+        let csv = CsvRows::new(Dialect { bom: true, ..Dialect::default() }, TimeForm::default(), &[]);
         let long = "time,elapsed_s,node,signal,value,unit,status,raw";
         assert_eq!(csv.check_header(long, Columns::Long), Ok(()));
         assert_eq!(csv.check_header(&format!("{long}\r"), Columns::Long), Ok(()));
         let mismatch = HeaderMismatch { found: "a;b".to_owned(), expected: long.to_owned() };
         assert_eq!(csv.check_header("a;b", Columns::Long), Err(mismatch));
         assert!(csv.check_header("{}", Columns::Long).is_err());
+        let tagged = CsvRows::new(Dialect::default(), TimeForm::default(), &[("bench".to_owned(), "3".to_owned())]);
+        assert_eq!(tagged.check_header(&format!("{long},bench"), Columns::Long), Ok(()));
+        assert!(tagged.check_header(long, Columns::Long).is_err(), "a tag is a column");
     }
 }

@@ -14,11 +14,30 @@ use std::io;
 #[derive(Debug)]
 pub(super) struct JsonRows {
     times: Times,
+    tag_names: Vec<String>,
+    /// The members of the tags, each after a comma.
+    tag_members: Vec<u8>,
 }
 
 impl JsonRows {
-    pub(super) fn new(time: TimeForm) -> JsonRows {
-        JsonRows { times: Times::new(time) }
+    pub(super) fn new(time: TimeForm, tags: &[(String, String)]) -> JsonRows {
+        let mut tag_members = Vec::new();
+        for (name, value) in tags {
+            let name: serde_json::Value = name.as_str().into();
+            let value: serde_json::Value = value.as_str().into();
+            tag_members.extend_from_slice(format!(",{name}:{value}").as_bytes());
+        }
+        let tag_names = tags.iter().map(|(name, _)| name.clone()).collect();
+        JsonRows { times: Times::new(time), tag_names, tag_members }
+    }
+
+    /// Adds the tags to the object that ends here.
+    fn add_tags(&self, out: &mut Vec<u8>) {
+        if !self.tag_members.is_empty() {
+            out.truncate(out.len() - b"}\n".len());
+            out.extend_from_slice(&self.tag_members);
+            out.extend_from_slice(b"}\n");
+        }
     }
 }
 
@@ -48,7 +67,7 @@ impl RowFormat for JsonRows {
     fn check_header(&self, first_line: &str, columns: Columns<'_>) -> Result<(), HeaderMismatch> {
         let row = serde_json::from_str::<BTreeMap<String, serde_json::Value>>(first_line);
         let found: Vec<String> = row.unwrap_or_default().into_keys().collect();
-        let names = columns.names();
+        let names: Vec<String> = columns.names().into_iter().chain(self.tag_names.iter().cloned()).collect();
         let mut expected = names.clone();
         expected.sort_unstable();
         if found == expected {
@@ -71,7 +90,7 @@ impl RowFormat for JsonRows {
                     status: sample.status.map(Status::as_str),
                     raw: sample.raw.to_string(),
                 };
-                json::line(out, &row)
+                json::line(out, &row)?;
             }
             Values::Cycle { columns, cells } => {
                 let mut serializer = serde_json::Serializer::new(&mut *out);
@@ -85,9 +104,10 @@ impl RowFormat for JsonRows {
                 }
                 object.end()?;
                 out.push(b'\n');
-                Ok(())
             }
         }
+        self.add_tags(out);
+        Ok(())
     }
 }
 
@@ -98,7 +118,7 @@ mod tests {
 
     #[test]
     fn only_the_same_keys_may_follow() {
-        let json = JsonRows::new(TimeForm::default());
+        let json = JsonRows::new(TimeForm::default(), &[]);
         let keys: Vec<String> = LONG_COLUMNS.iter().rev().map(|key| format!("\"{key}\":1")).collect();
         assert_eq!(json.check_header(&format!("{{{}}}", keys.join(",")), Columns::Long), Ok(()));
         assert!(json.check_header("{\"time\":1}", Columns::Long).is_err());
