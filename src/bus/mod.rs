@@ -14,6 +14,7 @@ pub mod interrupt;
 pub mod memory;
 mod own_clock;
 pub mod owner;
+pub mod paced;
 pub mod parallel;
 mod pcapng;
 #[cfg(unix)]
@@ -161,6 +162,15 @@ impl<B: BitRateControl + ?Sized> BitRateControl for Box<B> {
     delegate_bus!(self, (**self) => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
 }
 
+impl<B: Bus + ?Sized> Bus for &mut B {
+    delegate_bus!(self, (**self) => name timestamps is_live sends_remote_frames waits now mono listen send receive receive_buffer
+        late_drops finish);
+}
+
+impl<B: BitRateControl + ?Sized> BitRateControl for &mut B {
+    delegate_bus!(self, (**self) => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
 /// The size of the receive buffer. On Linux a frame takes about 800 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReceiveBuffer {
@@ -304,6 +314,20 @@ pub enum Filters {
 }
 
 impl Filters {
+    /// The filters that pass each frame that one of `each` passes.
+    pub fn any_of<'a>(each: impl Iterator<Item = &'a Filters>) -> Filters {
+        let mut all = Vec::new();
+        for filters in each {
+            match filters {
+                Filters::All => return Filters::All,
+                Filters::Only(ids) => all.extend(ids),
+            }
+        }
+        all.sort_unstable();
+        all.dedup();
+        Filters::Only(all)
+    }
+
     /// Whether `frame` passes.
     pub fn wants(&self, frame: &Frame) -> bool {
         match self {

@@ -12,21 +12,18 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-/// The highest bus load of all procedures together if there is no other traffic. The rest is for frames of low
-/// priority, such as heartbeats.
+/// The highest bus load of all procedures together. The rest is for frames of low priority, such as heartbeats. With
+/// other traffic, [`Paced`](super::paced::Paced) has a lower limit.
 const OWN_LOAD: f64 = 0.9;
-
-/// The highest bus load of the procedures and other traffic together.
-const SHARED_LOAD: f64 = 0.5;
-
-/// The bus load that the procedures may always use, even if other traffic is heavier.
-const LEAST_LOAD: f64 = 0.05;
-
-/// The time in which the load of other traffic is measured.
-const WINDOW: Duration = Duration::from_millis(100);
 
 /// The frames in the transmit queue may together need this time on the bus.
 const QUEUED: Duration = Duration::from_millis(2);
+
+/// The wait before a frame is sent again that the bus did not accept.
+const RETRY_INTERVAL: Duration = Duration::from_millis(1);
+
+/// How long a frame is sent again. Then the procedure gets the error.
+const RETRY_LIMIT: Duration = Duration::from_secs(1);
 
 /// Runs `work` for all items at the same time; the results have the order of the items. A procedure cannot change the
 /// bit rate of the interface. A failure of the bus is an error for each procedure that waits.
@@ -170,29 +167,14 @@ struct Pace {
     bit_rate: Option<u32>,
     /// When the next frame may be sent.
     ready_at: Mono,
-    /// The end of the present measurement of other traffic.
-    window_end: Mono,
-    /// The time that other frames have needed on the bus in this measurement.
-    others: Duration,
-    /// The load of other traffic in the last measurement.
-    load: f64,
 }
 
 impl Pace {
     /// A frame was sent. Its answer is assumed to have the same length.
     fn on_sent(&mut self, frame: &Frame, now: Mono) {
         let Some(bit_rate) = self.bit_rate else { return };
-        if now >= self.window_end {
-            self.load = self.others.as_secs_f64() / (now.since(self.window_end) + WINDOW).as_secs_f64();
-            (self.window_end, self.others) = (now + WINDOW, Duration::ZERO);
-        }
-        let load = if self.load > 0.01 { (SHARED_LOAD - self.load).max(LEAST_LOAD) } else { OWN_LOAD };
         let earliest = Mono::at(now.since_start().saturating_sub(QUEUED));
-        self.ready_at = self.ready_at.max(earliest) + (2 * frame_time(frame, bit_rate)).div_f64(load);
-    }
-
-    fn on_other(&mut self, frame: &Frame) {
-        self.others += self.bit_rate.map_or(Duration::ZERO, |bit_rate| frame_time(frame, bit_rate));
+        self.ready_at = self.ready_at.max(earliest) + (2 * frame_time(frame, bit_rate)).div_f64(OWN_LOAD);
     }
 }
 
@@ -202,14 +184,21 @@ struct Conductor<'a> {
     procedures: Vec<Procedure>,
     /// The frames that wait to be sent, with their procedures.
     waiting: VecDeque<(usize, Frame)>,
+    /// Since when the bus accepts no frame.
+    full_since: Option<Mono>,
     pace: Pace,
 }
 
 impl Conductor<'_> {
     fn new(bus: &mut dyn Bus, procedures: Vec<Procedure>) -> Conductor<'_> {
         let (now, bit_rate) = (bus.mono(), bus.bit_rate().filter(|rate| *rate > 0));
-        let pace = Pace { bit_rate, ready_at: now, window_end: now + WINDOW, others: Duration::ZERO, load: 0.0 };
-        Conductor { bus, procedures, waiting: VecDeque::new(), pace }
+        Conductor {
+            bus,
+            procedures,
+            waiting: VecDeque::new(),
+            full_since: None,
+            pace: Pace { bit_rate, ready_at: now },
+        }
     }
 
     /// Receives events for all procedures, until they have ended.
@@ -232,7 +221,6 @@ impl Conductor<'_> {
             let Some(at) = self.procedures.iter().position(|procedure| procedure.until.is_some()) else { return };
             return self.answer(at, Answer::Event(event));
         };
-        let mut is_ours = false;
         for at in 0..self.procedures.len() {
             let procedure = &mut self.procedures[at];
             let concerns = match event {
@@ -240,15 +228,11 @@ impl Conductor<'_> {
                 Event::Timeout => procedure.until.is_some_and(|until| until <= now),
                 _ => true,
             };
-            is_ours |= concerns;
             match procedure.until {
                 Some(_) if concerns => self.answer(at, Answer::Event(Ok(event))),
                 None if concerns && event != Event::Timeout => procedure.missed.push_back(event),
                 _ => {}
             }
-        }
-        if let (Event::Frame(received), false) = (event, is_ours) {
-            self.pace.on_other(&received.frame);
         }
     }
 
@@ -258,8 +242,18 @@ impl Conductor<'_> {
             && let Some((at, frame)) = self.waiting.pop_front()
         {
             let result = self.bus.send(&frame);
+            let now = self.bus.mono();
+            if matches!(result, Err(BusError::QueueFull)) {
+                let since = *self.full_since.get_or_insert(now);
+                if now.since(since) < RETRY_LIMIT {
+                    self.waiting.push_front((at, frame));
+                    self.pace.ready_at = now + RETRY_INTERVAL;
+                    return;
+                }
+            }
+            self.full_since = None;
             if result.is_ok() {
-                self.pace.on_sent(&frame, self.bus.mono());
+                self.pace.on_sent(&frame, now);
             }
             self.answer(at, Answer::Done(result));
         }
@@ -274,9 +268,9 @@ impl Conductor<'_> {
 
     /// Carries out the calls of one procedure until it waits or ends.
     fn serve(&mut self, at: usize) {
-        let procedure = &mut self.procedures[at];
-        procedure.until = None;
+        self.procedures[at].until = None;
         loop {
+            let procedure = &mut self.procedures[at];
             let answer = match procedure.calls.recv() {
                 Ok(Call::Receive(until)) => match procedure.missed.pop_front() {
                     Some(event) => Answer::Event(Ok(event)),
@@ -292,8 +286,8 @@ impl Conductor<'_> {
                 }
                 Ok(Call::Listen(filters)) => {
                     procedure.filters = filters;
-                    // The traffic of others is measured as well.
-                    Answer::Done(self.bus.listen(&Filters::All))
+                    let each = self.procedures.iter().map(|procedure| &procedure.filters);
+                    Answer::Done(self.bus.listen(&Filters::any_of(each)))
                 }
                 Err(_) => {
                     procedure.filters = Filters::Only(Vec::new());
@@ -301,7 +295,7 @@ impl Conductor<'_> {
                 }
             };
             // If the procedure has ended, this fails, and the next `recv` reports the end.
-            let _ = procedure.answers.send(answer);
+            let _ = self.procedures[at].answers.send(answer);
         }
     }
 }

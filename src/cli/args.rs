@@ -31,6 +31,20 @@ impl FromStr for Duration {
     }
 }
 
+/// A bus load in percent, 5 to 100: `50%`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Load(pub u8);
+
+impl FromStr for Load {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Load, String> {
+        let number = text.strip_suffix('%').map(str::trim_end).and_then(|number| number.parse().ok());
+        let load = number.filter(|load| (5..=100).contains(load)).map(Load);
+        load.ok_or_else(|| "not a bus load (5% to 100%)".to_owned())
+    }
+}
+
 /// A bit rate in bit/s: `250k`, `1M`, `125000`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitRate(pub u32);

@@ -51,7 +51,7 @@ use crate::output::notes::undone_text;
 use crate::output::report::{Format, Report, Stream, render};
 use crate::tasks::journal::Journal;
 use anstream::{AutoStream, ColorChoice};
-use args::{BusSpec, Channel, Duration, Override};
+use args::{BusSpec, Channel, Duration, Load, Override};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use descriptions::Named;
 use exit::{FileError, IntoFailure};
@@ -149,6 +149,11 @@ pub struct Global {
     /// Use a description or EDS of another device (its vendor or product differs)
     #[arg(long, global = true)]
     pub(crate) accept_mismatch: bool,
+
+    /// Highest bus load of set-up, scan, polling and config apply together with other traffic [default: 50% while other
+    /// nodes send, otherwise no limit]
+    #[arg(long, global = true, value_name = "SHARE")]
+    pub(crate) max_load: Option<Load>,
 
     /// Output format: text, JSON Lines or CSV; for log, text means csv, and influx is line protocol
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]

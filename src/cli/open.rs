@@ -9,6 +9,7 @@ use crate::bus::claim::{Claim, ClaimError, Claims, IfHeld, Part};
 use crate::bus::file::wait_for_reader;
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
+use crate::bus::paced::Paced;
 use crate::bus::remote::Use;
 use crate::bus::replay::{Replay, ReplayNote};
 use crate::bus::time::format_duration;
@@ -93,7 +94,17 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
         }
     };
     let bus = traced(global, bus)?;
+    let bus = if matches!(spec, BusSpec::Replay(_)) { bus } else { paced(global, bus, &channels) };
     Ok(if channels.is_empty() { bus } else { Box::new(SdoChannels::new(bus, &channels)) })
+}
+
+/// The bus with a limit for the load of SDO transfers.
+fn paced(global: &Global, bus: Box<dyn Bus>, channels: &[SdoChannel]) -> Box<dyn Bus> {
+    if global.max_load.is_some() && bus.bit_rate().is_none() {
+        global.console().note(&format!("the bit rate of {} is unknown: --max-load has no effect", bus.name()));
+    }
+    let ids = channels.iter().map(|channel| (channel.request, channel.response)).collect();
+    Box::new(Paced::new(bus, global.max_load.map(|load| load.0), ids))
 }
 
 /// The bus with a trace, if requested. The trace is opened after the bus: if the bus cannot be opened, an existing

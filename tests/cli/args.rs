@@ -38,6 +38,10 @@ fn wrong_arguments_are_explained() {
         done.stderr.lines().next().unwrap_or("").to_owned()
     };
     assert_eq!(first("scam"), "cangauge: unrecognized subcommand 'scam'");
+    for load in ["50", "0%", "101%", "half"] {
+        let expected = format!("cangauge: \"{load}\" for --max-load <SHARE>: not a bus load (5% to 100%)");
+        assert_eq!(first(&format!("scan --max-load {load}")), expected);
+    }
     assert_eq!(first("nmt jump 1"), "cangauge: unrecognized subcommand 'jump'");
     assert_eq!(first("read"), "cangauge: the following required arguments were not provided: <NODES>");
     assert_eq!(first("read 1 --sync 1s"), "cangauge: unexpected argument '--sync' found");

@@ -9,6 +9,7 @@ use crate::time::bound;
 use cangauge::bus::coded::Coded;
 use cangauge::bus::faults::Faulty;
 use cangauge::bus::memory::MemoryBus;
+use cangauge::bus::paced::Paced;
 use cangauge::bus::{Bus, Event, Filters, Mono};
 use cangauge::canopen::frame::Frame;
 use cangauge::sim::Recorder;
@@ -81,6 +82,11 @@ fn device_states(bus: &MemoryBus) -> Vec<DeviceState> {
     bus.stations::<FaultyDevice>().map(|station| device_state(&station.device)).collect()
 }
 
+/// The bus as the commands use it.
+fn paced(bus: &mut dyn Bus) -> Paced<&mut dyn Bus> {
+    Paced::new(bus, None, Vec::new())
+}
+
 pub(crate) fn run(spec: &Spec) -> Run {
     let record = Memory::default();
     let recorder = Recorder::new(Box::new(record.clone())).expect("memory");
@@ -97,7 +103,7 @@ pub(crate) fn run(spec: &Spec) -> Run {
     let bus = Coded::new(Faulty::new(bus, plan(&spec.faults)), spec.codec);
     let mut bus = Tap::new(bus, started + bound, kill);
     let mut observed = Observations::default();
-    let mut result = carry_out(&mut bus, spec, &mut observed);
+    let mut result = carry_out(&mut paced(&mut bus), spec, &mut observed);
     let mut killed = None;
     if let (true, Some(kill)) = (bus.is_dead, spec.kill) {
         let frames = std::mem::take(&mut bus.frames);
@@ -110,7 +116,7 @@ pub(crate) fn run(spec: &Spec) -> Run {
         // A program that starts receives every frame.
         bus.listen(&Filters::All).expect("it can always listen");
         observed = Observations::default();
-        result = carry_out(&mut bus, spec, &mut observed);
+        result = carry_out(&mut paced(&mut bus), spec, &mut observed);
     }
     let ended = bus.now().mono;
     if bus.overran {
