@@ -18,7 +18,7 @@ use clap::Args;
 /// Set the zero of a channel (6125h), with checks before and after
 ///
 /// The command measures, writes the signature once, and measures again. If the reading is then not zero, the exit
-/// code is 6. The shift is printed, and the command to undo it is printed on stderr.
+/// code is 6. The change of the zero is printed as "shift". The command to undo it is printed on stderr.
 ///
 /// Before the write it checks these conditions. If one of them is not met, it changes nothing and exits with 1. Each
 /// reading must be valid. The sensor must not measure absolute pressure. The mean must be within the limit. The

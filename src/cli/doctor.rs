@@ -22,7 +22,7 @@ use clap::Args;
     after_help = "Examples:\n  cangauge doctor 5\n  cangauge doctor --passive\n  cangauge doctor all --format json"
 )]
 pub(crate) struct Doctor {
-    /// Node-ID: 5, 0x7f, or all. If no node answers, `all` also searches devices without a node-ID (LSS)
+    /// Node-ID: 5, 0x7f, or all. If no node answers, `all` also searches for devices without a node-ID (LSS)
     /// [default: every node]
     node: Option<Nodes>,
     /// Send nothing

@@ -8,7 +8,7 @@ use crate::output::dbc;
 use crate::tasks::export::messages;
 use clap::{Args, Subcommand};
 
-/// Describe the TPDOs of nodes for other programs
+/// Export the TPDOs of nodes for other programs (DBC)
 #[derive(Debug, Args)]
 pub(crate) struct Export {
     #[command(subcommand)]

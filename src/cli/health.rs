@@ -31,7 +31,7 @@ pub(crate) struct HealthCommand {
     /// Measure for this time [default: 10s; a recording is measured to its end]
     #[arg(short, long = "for", visible_alias = "duration", value_name = "DUR")]
     duration: Option<Duration>,
-    /// Send nothing. SDO answer times are then measured at the reads of other masters
+    /// Send nothing. SDO answer times are then measured from the reads of other masters
     #[arg(long)]
     pub(super) passive: bool,
     /// Bit rate of the bus, if the interface does not report it: 250k

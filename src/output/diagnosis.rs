@@ -170,7 +170,7 @@ fn not_sent(number: TpdoNumber, when: &str, silence: &Silence) -> String {
     };
     let heard = match unknown.is_empty() {
         true => String::new(),
-        false => format!(" (frames with COB-ID {} were received, which no TPDO of the node has)", unknown.join(", ")),
+        false => format!(" (frames were received with COB-ID {}, which no TPDO of the node uses)", unknown.join(", ")),
     };
     format!("{number} is due {when}, and no {number} was received{heard}: {state}")
 }

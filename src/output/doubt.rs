@@ -26,7 +26,7 @@ pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
              device: --device dps (or --eds FILE)"
         ),
         Doubt::EndOfType => format!(
-            "node {node}: {signal}: the value is at the end of its integer type and may be clipped; read 0x6130 or \
+            "node {node}: {signal}: the value is the limit of its integer type and may be clipped; read 0x6130 or \
              0x9130 instead"
         ),
         Doubt::UnknownStatus => {
@@ -38,7 +38,7 @@ pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
 /// The message for an object without a known type.
 pub fn unknown_type(signal: &str) -> String {
     match signal.split_once('/') {
-        Some((object, stated)) => format!("the width of {object} is not that of {stated}: no value"),
+        Some((object, stated)) => format!("the stated type {stated} does not fit the width of {object}: no value"),
         None => format!("the type of {signal} is unknown, or has another width: no value"),
     }
 }
@@ -57,12 +57,12 @@ pub fn type_remedy(node: NodeId, signal: &str) -> String {
 pub fn may_clip(value: &NarrowValue) -> String {
     let unit = value.unit.map(|unit| format!(" {unit}")).unwrap_or_default();
     let range = value.range_end.map_or_else(
-        || "the measuring range may go further".to_owned(),
-        |end| format!("the measuring range goes to {end}{unit}"),
+        || "the measuring range may be larger".to_owned(),
+        |end| format!("the measuring range extends to {end}{unit}"),
     );
     let (NarrowValue { signal, object, largest, .. }, channel) = (value, value.object.sub);
     format!(
-        "{signal}: {object} ends at {largest}{unit}, and {range}: values may be clipped; use \
+        "{signal}: the largest value of {object} is {largest}{unit}, and {range}: values may be clipped; use \
          0x6130:{channel} or 0x9130:{channel}"
     )
 }

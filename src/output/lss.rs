@@ -269,7 +269,10 @@ fn event(fact: &LssFact) -> NoteText {
         LssEvent::MoreUnconfigured { last, reason } => more_unconfigured(*last, reason.as_ref()),
         LssEvent::NoReturn { bit_rate } => NoteText::new(
             "no-return",
-            format!("it stores {} before it uses it: it cannot return to the old bit rate", short(*bit_rate)),
+            format!(
+                "the device uses {} only after it is stored, so it cannot return to the old bit rate",
+                short(*bit_rate)
+            ),
         ),
     }
 }
@@ -290,8 +293,9 @@ fn more_unconfigured(last: LssAddress, reason: Option<&Reason>) -> NoteText {
         Some(reason) => reason.0.to_string(),
         None => "the same device answered again".to_owned(),
     };
-    let message =
-        format!("there may be more devices without a node-ID than {last} ({reason}): set its node-ID, then scan again");
+    let message = format!(
+        "more devices than {last} may have no node-ID ({reason}): set the node-ID of this device, then scan again"
+    );
     NoteText::new("more-unconfigured", message)
 }
 

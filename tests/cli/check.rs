@@ -334,7 +334,7 @@ fn log_with_expressions() {
 fn limits_without_a_unit_are_reported() {
     let bench = constant();
     let warning =
-        |number, unit| format!("warning: limit {number} has no unit; taken as {unit}, the unit of the device\n");
+        |number, unit| format!("warning: limit {number} has no unit: the unit of the device ({unit}) is used\n");
     let done = check(&bench, &["5", "pressure < 5", "temperature in 20..30 degC"]).exit(0);
     assert_eq!(done.stderr, warning("5", "bar"));
     let done = check(&bench, &["5,127", "pressure > 5"]).exit(1);

@@ -481,7 +481,7 @@ fn objects_of_a_dcf_that_the_device_lacks_are_reported() {
     std::fs::write(bench.path("x.dcf"), &dcf).expect("a file");
     let done = bench.run("config apply 1 x.dcf").exit(0);
     assert!(done.stderr.contains("node 1: the device does not have: 0x2FF0:0 (gain)\n"), "{}", done.stderr);
-    let others = "node 1: not set, because they are read-only, commands or other PDOs: 0x1000:0 (device-type)\n";
+    let others = "node 1: not set, because they are read-only, commands or PDO parameters without a setting: 0x1000:0 (device-type)\n";
     assert!(done.stderr.contains(others), "{}", done.stderr);
     let report = bench.run("config apply 1 x.dcf -f json").exit(0).json();
     assert_eq!(report[0]["notes"][0]["code"], "not-on-device");

@@ -352,7 +352,7 @@ fn passive_sends_nothing_and_needs_a_mapping() {
     assert_eq!(
         done.stderr,
         "cangauge: node 5: the mapping of its TPDOs is unknown\n\
-         hint: name the device: --device 5=mh4 (or a file), or start recording before another master reads it\n"
+         hint: name the device: --device 5=mh4 (or a file), or start recording before another master reads the mapping\n"
     );
     assert_eq!(done.stdout, "");
     let done = one("dps", "").run("log 5 --passive --device dps").exit(3);

@@ -232,7 +232,7 @@ fn scan_inquire_and_identify() {
     let done =
         Bench::described(&format!("{hides}[[device]]\nkind = \"mh4\"\nserial = 20\n")).run("lss scan -f json").exit(0);
     assert_eq!((done.json().len(), done.json()[0]["serial"].clone()), (1, 10.into()), "{}", done.stdout);
-    assert!(done.stderr.contains("there may be more devices"), "{}", done.stderr);
+    assert!(done.stderr.contains("more devices than 0x47:0x1:0x1:10 may have no node-ID"), "{}", done.stderr);
     Bench::of(ALL).run("lss inquire 1").prints("0x47:0x1:0x1:10001  node 1\n");
     Bench::of(ALL).run("lss inquire 1 -f json").prints(
         "{\"target\":\"1\",\"node\":1,\"unconfigured\":false,\"vendor\":71,\"vendor_name\":\"WIKA\",\"product\":1,\"revision\":1,\"serial\":10001}\n",

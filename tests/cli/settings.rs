@@ -220,7 +220,7 @@ fn filter_of_the_mc1609_has_its_limits() {
     assert!(done.stderr.contains(text) && !done.stderr.contains("filter constant"), "{}", done.stderr);
     assert_eq!(bench(&timer(1000)).run("filter 3 ch1").exit(0).stderr, "");
     let done = bench("set = { \"0x1800:2\" = 10 }\n").run("filter 3 ch1 --type repeating").exit(0);
-    assert!(done.stderr.contains("TPDO1 is sent on SYNC: if that takes longer, after 1000 ms"), "{}", done.stderr);
+    assert!(done.stderr.contains("TPDO1 is sent on SYNC: if its interval is longer than 1000 ms"), "{}", done.stderr);
 }
 
 #[test]
@@ -248,13 +248,13 @@ fn too_narrow_integer_is_a_warning_before_it_clips() {
     let narrow = "\"0x1A00:1\" = 0x71300110, \"0x1A00:0\" = 1";
     for (set, line) in [(narrow, "unit 5 pressure psi"), (narrow, "sdo write 5 0x6131:1 0x00AB0000")] {
         let done = mapped(set).run(line).exit(0);
-        let warning = "warning: node 5: pressure: 0x7130:1 ends at 32.767 psi";
+        let warning = "warning: node 5: pressure: the largest value of 0x7130:1 is 32.767 psi";
         assert!(done.stderr.contains(warning) && done.stderr.contains("0x9130:1"), "{line}: {}", done.stderr);
     }
     // The mapping itself narrows the value.
     for line in ["pdo map 5 1 0x7130:1", "pdo map 5 2 0x7130:1 pressure.status"] {
         let done = mapped("\"0x6131:1\" = 0x00AB0000, \"0x6149:1\" = 145.0").run(line).exit(0);
-        let warning = "warning: node 5: pressure: 0x7130:1 ends at 32.767 psi";
+        let warning = "warning: node 5: pressure: the largest value of 0x7130:1 is 32.767 psi";
         assert!(done.stderr.contains(warning) && done.stderr.contains("0x9130:1"), "{line}: {}", done.stderr);
     }
     let done = mapped("\"0x1017\" = 0").run("pdo map 5 1 0x7130:1").exit(0);

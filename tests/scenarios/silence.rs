@@ -309,7 +309,7 @@ fn each_cause_has_its_reason() {
             "another COB-ID than in 1800h:1, at SYNC",
             Case { no_nmt: true, ..Case::mh4("").sync(100) }
                 .hears(&[(2000, "1C5#0000A03F00"), (2100, "1C5#0000A03F00")]),
-            "no TPDO1 was received (frames with COB-ID 1C5 were received, which no TPDO of the node has): \
+            "no TPDO1 was received (frames were received with COB-ID 1C5, which no TPDO of the node uses): \
              the node is not operational, or sends with another COB-ID",
         ),
         (

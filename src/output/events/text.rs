@@ -51,7 +51,7 @@ pub fn event_text(event: &LogEvent) -> EventText {
         }
         LogEvent::Back(node) => of_node(*node, "back", Info, format!("node {node} is back")),
         LogEvent::WrongLength(node, mapped, received) => {
-            of_node(*node, "length", Warning, length_text(*node, *mapped, *received, "it makes no row"))
+            of_node(*node, "length", Warning, length_text(*node, *mapped, *received, "the TPDO is not recorded"))
         }
         LogEvent::LongerTpdo(node, mapped, received) => {
             let used = format!("the first {mapped} bytes are used from now on");
@@ -165,12 +165,15 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::PollFailed(error) => format!("node {}: {error}", error.node),
         Remark::ChangedWhileFramesLost(node, before) => {
             let before = format_duration(*before);
-            format!("node {node} changed while frames were lost: its rows of the {before} before may be wrong")
+            format!("node {node} changed while frames were lost: its rows of the last {before} may be wrong")
         }
         Remark::NotReadAgain(node) => format!("node {node} could not be read again: its later frames were ignored"),
         Remark::LeftOperational(nodes) => left_operational(nodes),
         Remark::NotStarted(nodes) => {
-            format!("not started, because only sensors are: node {}; start all nodes: log --start", listed(nodes))
+            format!(
+                "not started, because log starts only sensors: node {}; start all nodes: log --start",
+                listed(nodes)
+            )
         }
         Remark::OtherNmtMaster(nodes, command, target) => format!(
             "not started, because another NMT master sent \"{}\" to {}: node {}; start all nodes: log --start",
@@ -189,7 +192,7 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::SmallReceiveBuffer(buffer) => format!("frames were dropped: {}", buffer_text(*buffer)),
         Remark::Doubt(node, signal, doubt) => crate::output::doubt::doubt(*node, signal, *doubt),
         Remark::BareLimit(BareLimit { limit, unit }) => {
-            format!("limit {limit} has no unit; taken as {unit}, the unit of the device")
+            format!("limit {limit} has no unit: the unit of the device ({unit}) is used")
         }
         Remark::MayClip(node, value) => {
             format!("node {node}: {}", crate::output::doubt::may_clip(value))

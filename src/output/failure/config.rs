@@ -154,7 +154,10 @@ pub(in crate::output) fn fact(fact: &ConfigFact) -> NoteText {
         }
         ConfigFact::NotSettings { objects } => NoteText::new(
             "not-settings",
-            format!("not set, because they are read-only, commands or other PDOs: {}", objects.join(", ")),
+            format!(
+                "not set, because they are read-only, commands or PDO parameters without a setting: {}",
+                objects.join(", ")
+            ),
         ),
         ConfigFact::RateAfterRestart { rate } => NoteText::new(
             "rate-after-restart",

@@ -45,7 +45,7 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         LogFailure::TwoSenders(number) => {
             Words::new(two_senders(*number)).hint("disconnect one of them, or change its node-ID: cangauge lss scan")
         }
-        LogFailure::Replaced => Words::new("another device has replaced it (with -o, its rows are in a new file)"),
+        LogFailure::Replaced => Words::new("another device has this node-ID now (with -o, its rows are in a new file)"),
         LogFailure::UnknownMapping => unknown_mapping(failure),
         LogFailure::OtherLength { mapped, received, is_live } => other_length(failure, *mapped, *received, *is_live),
         LogFailure::NothingReceived { within, nodes, has_traffic, interface } => {
@@ -74,7 +74,7 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
 fn unknown_mapping(failure: &Failure) -> Words {
     let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     Words::new("the mapping of its TPDOs is unknown").hint(format!(
-        "name the device: --device {node}=mh4 (or a file), or start recording before another master reads it"
+        "name the device: --device {node}=mh4 (or a file), or start recording before another master reads the mapping"
     ))
 }
 

@@ -152,10 +152,16 @@ pub(in crate::output) fn fact(fact: &SettingsFact) -> NoteText {
             NoteText::new("filter-constant", format!("filter constant {constant}: {meaning}"))
         }
         SettingsFact::RepeatingLimit { tpdo, timer_ms, limit_ms } => {
-            let change = format!("after {limit_ms} ms the device changes to the moving average");
             let message = match timer_ms {
-                Some(timer_ms) => format!("{tpdo} is sent every {timer_ms} ms: {change}"),
-                None => format!("{tpdo} is sent on SYNC: if that takes longer, {change}"),
+                Some(timer_ms) => {
+                    format!(
+                        "{tpdo} is sent every {timer_ms} ms: after {limit_ms} ms the device changes to the moving average"
+                    )
+                }
+                None => format!(
+                    "{tpdo} is sent on SYNC: if its interval is longer than {limit_ms} ms, the device changes to the \
+                     moving average"
+                ),
             };
             NoteText::new("repeating-limit", message)
         }

@@ -123,8 +123,8 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> NoteTex
         StoreFact::Unchanged(settings) => NoteText::new(
             "unchanged",
             format!(
-                "these settings did not change at the reset and are not the usual defaults (set at the factory, or \
-                 not restored): {}",
+                "these settings did not change, and differ from the usual defaults; they were set at the factory, or \
+                 were not restored: {}",
                 list(settings, with_value)
             ),
         ),
