@@ -35,7 +35,7 @@ const LONGEST_WAIT: Duration = Duration::from_millis(100);
 /// The longest time between two requests on a bus that is always above the limit.
 const LONGEST_PAUSE: Duration = Duration::from_millis(500);
 
-/// The number of requests from which traffic is measured. A command with fewer requests is no load.
+/// The number of requests from which traffic is measured. A command with fewer requests is not a load.
 const MANY: u32 = 16;
 
 /// The measurement ends when no request was sent for this time.
@@ -193,7 +193,7 @@ impl<B: Bus> Bus for Paced<B> {
             if self.filters.wants(frame) {
                 return Ok(event);
             }
-            // Frames that nobody wants do not extend the wait.
+            // Frames that no listener wants do not extend the wait.
             if now >= deadline {
                 return Ok(Event::Timeout);
             }
@@ -226,7 +226,7 @@ mod tests {
 
     const BIT_RATE: u32 = 250_000;
 
-    /// Sends one frame of 8 bytes every so many microseconds, and answers SDO requests.
+    /// Sends one frame of 8 bytes at an interval in microseconds, and answers SDO requests.
     struct Sender {
         every: Option<Duration>,
         next: Mono,
@@ -301,7 +301,7 @@ mod tests {
     fn silent_bus_has_no_limit_unless_the_user_sets_one() {
         let (free, load) = read(None, None, Some(BIT_RATE));
         assert!(load > 0.8, "{load}, {free} answers");
-        // A heartbeat per second is no traffic.
+        // A heartbeat per second does not count as traffic.
         let (beside, _) = read(us(1_000_000), None, Some(BIT_RATE));
         assert!(beside.abs_diff(free) <= 2, "{beside} and {free}");
         let (_, load) = read(None, Some(20), Some(BIT_RATE));

@@ -323,7 +323,7 @@ pub(super) fn printable(text: &str) -> String {
     text.chars().take(80).map(safe).collect()
 }
 
-/// The text of an error, without the number of the system.
+/// The text of an error, without the error number of the operating system.
 fn plain(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::ConnectionRefused => "connection refused: no server listens there".to_owned(),

@@ -4,7 +4,7 @@ use std::io::stdin;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 
-/// The lines of stdin, read by a thread of their own. It ends with the program.
+/// The lines of stdin, read by a separate thread. It ends with the program.
 pub struct TypedLines(Receiver<String>);
 
 impl TypedLines {

@@ -38,7 +38,7 @@ impl ObjectId {
         ObjectId { index: u16::from_le_bytes([bytes[0], bytes[1]]), sub: bytes[2] }
     }
 
-    /// Whether a text is an address, or looks like one although it is wrong: `12345`, `6130:300`. It is no name then.
+    /// Whether a text is an address, or looks like one although it is wrong: `12345`, `6130:300`. It is not a name then.
     pub fn reads_as_address(text: &str) -> bool {
         let is_part = |character: char| character.is_ascii_hexdigit() || "xXhH:.".contains(character);
         let index = text.split([':', '.']).next().unwrap_or(text);

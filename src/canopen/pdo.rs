@@ -183,7 +183,7 @@ impl Field {
     }
 }
 
-/// The fields of a mapping: each starts where the previous one ends (CiA 301, 7.5.2.36).
+/// The fields of a mapping: each starts at the end of the previous one (CiA 301, 7.5.2.36).
 ///
 /// Some devices set the highest bit of an entry's length. A PDO has at most 64 bits, so the lower seven bits are used.
 pub fn lay_out(mapping: &[MappingEntry]) -> Vec<Field> {

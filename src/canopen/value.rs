@@ -194,9 +194,9 @@ impl FromStr for DataType {
 /// TIME_OF_DAY or TIME_DIFFERENCE (CiA 301, 7.1.6.6 and 7.1.6.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CanTime {
-    /// Milliseconds (28 bits): since midnight, or of the difference.
+    /// Milliseconds (28 bits) since midnight, or of a time difference.
     pub milliseconds: u32,
-    /// Days since 1984-01-01, or of the difference.
+    /// Days since 1984-01-01, or of a time difference.
     pub days: u16,
 }
 

@@ -217,7 +217,7 @@ fn place(command: &[&str], count: usize, option: Option<&str>) -> Place {
     }
 }
 
-/// The words that can be the last one, some with a description. None if it is a file.
+/// The words that fit at the end, some with a description. Empty if the last word is a file name.
 fn names(line: &[String], global: &Global) -> BTreeMap<String, String> {
     let Some((last, before)) = line.split_last() else { return BTreeMap::new() };
     let mut program = program();
@@ -303,7 +303,7 @@ fn device_names() -> impl Iterator<Item = String> {
     catalog::all().map(|model| model.description.name.clone())
 }
 
-/// The interfaces of this computer, the simulated devices, and the starts of other buses.
+/// The interfaces of this computer, the simulated devices, and the prefixes of other buses (`slcan:`).
 fn buses() -> Vec<String> {
     let mut all: Vec<String> = open::interfaces().into_iter().map(|(name, _)| name).collect();
     all.extend(["sim", "replay:", "slcan:", "socketcand://"].map(str::to_owned));

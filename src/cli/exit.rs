@@ -148,7 +148,8 @@ fn wrong_value(error: &clap::Error) -> Option<String> {
     Some(if named { inner } else { format!("\"{value}\" for {argument}: {inner}") })
 }
 
-/// Whether to print errors as JSON. Parsing has failed, so the option is searched in the words.
+/// Whether to print errors as JSON. Parsing has failed, so this function looks for the option in
+/// the words.
 fn wants_json(words: &[String]) -> bool {
     let apart = words.windows(2).any(|pair| matches!(pair[0].as_str(), "-f" | "--format") && pair[1] == "json");
     apart || words.iter().any(|word| word == "-fjson" || word == "--format=json")

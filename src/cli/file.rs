@@ -154,7 +154,7 @@ pub(super) struct ReportFile {
     _replaced: Option<File>,
     /// The whole lines of the existing report, if it is continued.
     before: Vec<u8>,
-    /// How long opening it waited for the reader of a FIFO.
+    /// The time for which the program waited for the reader of a FIFO.
     pub(super) waited: Duration,
 }
 

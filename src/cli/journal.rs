@@ -146,7 +146,8 @@ impl config::Journal for SettingsJournal<'_> {
 
     fn finish(&mut self) {
         if let Some(path) = &self.path {
-            // If the file remains, --rollback finds other values in the device than an interrupted change leaves.
+            // A failure is ignored. If the file remains, a later `--rollback` restores the settings from before this
+            // change.
             let _ = fs::remove_file(path);
         }
     }

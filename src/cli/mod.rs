@@ -406,7 +406,7 @@ impl Global {
         }
         let unknown = master.unknown_objects();
         let finished = bus.finish().or_fail();
-        // An unknown object can be the reason of a failure: without 1000h the types are unknown, too.
+        // An unknown object can be the reason of a failure: without 1000h the types are also unknown.
         let note = |(&node, objects): (&NodeId, &Vec<_>)| output::failure::unknown_objects(node, objects);
         unknown.iter().map(note).for_each(|text| self.console().note(&text));
         let result = result?;

@@ -187,8 +187,8 @@ impl Active {
         let is_rejected = error == TransferError::Aborted(AbortCode::COMMAND_SPECIFIER) || begins_blocks(error);
         let is_read = self.request.operation() == Operation::Read;
         if !has_begun && is_rejected && is_read && self.request.may_restart() && !self.was_rejected {
-            // A server with an interrupted transfer rejects the first request, and accepts the next one. The same holds
-            // if it received another request than this one, and its transfer was aborted.
+            // A server with an interrupted transfer rejects the first request, and accepts the next one. It also does
+            // this if a corrupted request started another transfer, and our abort ended that transfer.
             self.was_rejected = true;
         } else if has_begun && is_of_transmission(error) && self.restarts_left > 0 {
             self.restarts_left -= 1;
@@ -229,7 +229,7 @@ impl Active {
         }
     }
 
-    /// How long the request was repeated beyond its usual number of times.
+    /// How long the request has been repeated after the usual retries.
     pub(super) fn overtime(&self, now: Mono, timing: &Timing) -> Duration {
         let usual = self.timeout(timing) * (1 + timing.retries);
         self.asked_at.map_or(Duration::ZERO, |asked_at| now.since(asked_at).saturating_sub(usual))
@@ -255,7 +255,7 @@ impl Active {
         self.request.error(failure)
     }
 
-    /// An error for the deferred request, unless that is a write that was never sent.
+    /// An error for the deferred request. If this is a write that was never sent, the error is for the barrier read.
     pub(super) fn error_of_sent(&self, failure: SdoFailure) -> SdoError {
         let was_sent = |request: &Request| request.operation() == Operation::Read || request.refused_blocks;
         let deferred = self.deferred.as_ref().map(|(_, request)| request).filter(|request| was_sent(request));

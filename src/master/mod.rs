@@ -235,7 +235,7 @@ impl<'bus> Master<'bus> {
     /// Outer: the bus failed or the user interrupted. Inner: two devices answer.
     pub fn ensure_single(&mut self, node: NodeId) -> Result<Result<(), SdoError>, Error> {
         if self.sdo.needs_check(node) {
-            // A device without a serial number also answers. The write reports a silent device.
+            // The result is ignored: an abort is an answer too. If the device is silent, the write fails.
             self.transfer_one(Request::read(node, SERIAL_NUMBER).once())?.ok();
         }
         let error = |failure| Err(SdoError::two_devices(node, SERIAL_NUMBER, Operation::Write, failure));
@@ -330,7 +330,7 @@ impl<'bus> Master<'bus> {
         self.next_or(stop, stop + DRAIN_LIMIT)
     }
 
-    /// Waits until `until`. Frames received up to `last` count as received before it.
+    /// Waits until `until`. Frames received up to `last` count as received before `until`.
     fn next_or(&mut self, until: Mono, last: Mono) -> Result<Happening, Error> {
         loop {
             if let Some((ticket, result)) = self.sdo.pop_finished() {

@@ -93,8 +93,8 @@ impl Request {
         self
     }
 
-    /// The same request with the time-out of `other`. It is repeated even if `other` must not be repeated. After a
-    /// rejected block request it is not repeated, because that was the first attempt.
+    /// The same request with the time-out of `other`. It may be repeated, even if `other` must not be. Exception: a
+    /// rejected block request was the first attempt, so it is not repeated.
     pub(super) fn with_timing_of(mut self, other: &Request) -> Request {
         (self.timeout, self.repeatable) = (other.timeout, !other.refused_blocks);
         self

@@ -50,7 +50,7 @@ pub(super) struct SdoClient {
     nodes: BTreeMap<NodeId, Node>,
     finished: Finished,
     next_ticket: u64,
-    /// The earliest deadline, or an earlier moment. It avoids a search through all nodes for each frame.
+    /// A lower bound of the next deadline. It avoids a search through all nodes for each frame.
     due: Option<Mono>,
     /// When all transfers together must have ended, and the time that they had.
     limit: Option<(Mono, Duration)>,
@@ -374,7 +374,7 @@ fn earlier(one: Option<Mono>, other: Option<Mono>) -> Option<Mono> {
 }
 
 impl Node {
-    /// The object for a barrier read: other than `object`, and without a stale request of its own.
+    /// The object for a barrier read: not `object`, and without a stale request.
     fn barrier(&self, object: ObjectId) -> ObjectId {
         let is_fresh =
             |other: &ObjectId| *other != object && !self.stale.iter().any(|request| request.object == *other);

@@ -153,7 +153,7 @@ impl Outgoing {
                 self.first_at = is_taken.then_some(now);
             }
             if let Some(ticket) = ticket {
-                // A bus with several masters lets a frame wait for its turn.
+                // On a bus that several procedures share (`bus::parallel`), sending may wait: the clock is read again.
                 sent(*ticket, [now, bus.mono()]);
             }
             // Uses the length of this frame. With the longest length, a long burst would be slower than the bus.

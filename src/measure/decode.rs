@@ -152,7 +152,7 @@ impl Decoder {
             let mut decoder = self.tpdo_decoder(layout, tpdo, wanted);
             let id = tpdo.cob_id.can_id();
             match self.tpdos.remove(&id) {
-                // Nothing is mapped into one of two TPDOs of the node.
+                // Both TPDOs belong to the node. If the mapping of one is empty, the other one is decoded.
                 Some(other) if other.node == layout.node && decoder.length == 0 => decoder = other,
                 Some(other) if other.node == layout.node && other.length == 0 => {}
                 Some(other) => {

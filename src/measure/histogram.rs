@@ -61,7 +61,7 @@ impl Histogram {
     /// The distance from `centre` that a `share` (0 to 1) of all times does not exceed. The error is at most 0.0125 %
     /// of the time.
     pub fn distance(&self, centre: Duration, share: f64) -> Option<Duration> {
-        // The middle of a bucket may be after its last time.
+        // The middle of a bucket may be later than all times in the bucket.
         let farthest = self.farthest(centre)?;
         let centre = nanoseconds(centre);
         let mut distances: Vec<(u64, u64)> =

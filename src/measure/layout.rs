@@ -80,7 +80,7 @@ pub enum MeasuringRange {
     /// The range is unknown.
     #[default]
     Unknown,
-    /// The limits are unknown, and the manual warns that narrow integers may be clipped.
+    /// The limits are unknown, and the manual warns that integers of 8, 16 or 24 bits may be clipped.
     MayClip,
     /// The start and the end (6148h, 6149h), in the unit of the signal.
     Known(f64, f64),
@@ -255,7 +255,7 @@ impl Layout<'_> {
     }
 }
 
-/// A signal that is sent as an integer too narrow for its measuring range.
+/// A signal that is sent as an integer of at most 24 bits, whose limits are smaller than the measuring range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NarrowValue {
     /// The signal.
@@ -284,7 +284,7 @@ impl Layout<'_> {
 }
 
 impl Signal {
-    /// Returns the details if this type is too narrow for the measuring range.
+    /// Returns the details if the limits of this type are smaller than the measuring range.
     pub fn narrow_value(&self, object: ObjectId, data_type: DataType) -> Option<NarrowValue> {
         let DataType::Integer(width @ 1..=3) = data_type else { return None };
         let digits = self.digits.unwrap_or(0).min(9);

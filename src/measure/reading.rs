@@ -199,7 +199,7 @@ impl Reading {
         }
     }
 
-    /// Whether the measuring range extends beyond a value at the end of its type.
+    /// Whether the measuring range is larger than a value that is the limit of its type.
     fn range_goes_beyond(&self, value: f64) -> bool {
         match self.range {
             MeasuringRange::Known(start, end) if value > 0.0 => start.max(end) > value,

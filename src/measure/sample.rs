@@ -105,7 +105,7 @@ pub enum Status {
     OverloadHigh,
     /// Below the measuring range.
     OverloadLow,
-    /// The value is at the end of its integer type, and the measuring range is larger.
+    /// The value is the limit of its integer type, and the measuring range is larger.
     Clipped,
 }
 
@@ -212,7 +212,7 @@ pub enum Doubt {
     UnreadScale,
     /// The bytes are a REAL32 close to zero, and are probably an integer. There is no value.
     LooksLikeInteger,
-    /// The value is at the end of its integer type, and the measuring range is unknown. The value is kept.
+    /// The value is the limit of its integer type, and the measuring range is unknown. The value is kept.
     EndOfType,
     /// The status object has no valid answer. The value is kept.
     UnknownStatus,

@@ -92,7 +92,7 @@ impl Node {
         numbered.or_else(single).map(|entry| entry.object)
     }
 
-    /// Resolves a requested value on this node: a name is an object if no signal but an object has it.
+    /// Resolves a requested value on this node. A name means a signal if there is one, else an object.
     pub fn wanted(&self, item: &Wanted) -> Wanted {
         self.layout().resolve(item)
     }

@@ -27,12 +27,12 @@ const SENDING_STEP: Duration = Duration::from_millis(2);
 /// How long to wait for heartbeats after the first requests.
 const HEARTBEAT_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// The nodes that showed themselves.
+/// The nodes that were detected on the bus.
 #[derive(Default)]
 pub struct Presence {
     /// Nodes that answered an SDO request.
     pub answered: BTreeSet<NodeId>,
-    /// Nodes that showed another sign of life, with their state if a heartbeat showed it.
+    /// Nodes that were detected by a frame other than an SDO answer, with their state if a heartbeat showed it.
     pub states: BTreeMap<NodeId, Option<NmtState>>,
     /// The COB-IDs of received TPDOs, by their node in the predefined connection set.
     pub tpdos: BTreeMap<NodeId, BTreeSet<CanId>>,
@@ -46,7 +46,7 @@ pub struct Presence {
 }
 
 impl Presence {
-    /// Every node with a sign of life.
+    /// Every node that answered or sent a frame, except nodes detected only by a TPDO.
     pub fn nodes(&self) -> BTreeSet<NodeId> {
         self.answered.iter().chain(self.states.keys()).copied().collect()
     }

@@ -26,7 +26,8 @@ const LIFE_TIME_FACTOR: ObjectId = ObjectId::new(0x100d, 0);
 /// How long to listen for the guarding requests of another master.
 const OTHER_GUARD_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// The longest wait for a boot-up message. No manual gives a time, and a device may write its memory before.
+/// The longest wait for a boot-up message. No manual gives a time. A device may first write its
+/// non-volatile memory.
 pub const BOOT_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// The evidence for a state.
@@ -69,7 +70,7 @@ pub struct StateReport {
     pub state: Option<NmtState>,
     /// The evidence for the state.
     pub by: Proof,
-    /// Whether the node showed any sign of life.
+    /// Whether the node sent or answered anything.
     pub is_present: bool,
 }
 
@@ -111,7 +112,7 @@ impl StateSources {
 /// Heartbeats, boot-ups and guarding requests received while waiting.
 #[derive(Default)]
 pub struct LifeWatch {
-    /// The last sign of life of each node.
+    /// The last heartbeat or boot-up message of each node.
     pub lives: BTreeMap<NodeId, Life>,
     booted: BTreeSet<NodeId>,
     guarded_by_others: BTreeSet<NodeId>,
@@ -196,7 +197,7 @@ fn sources(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId,
 /// The states of nodes. One report for each node, in their order.
 ///
 /// # Errors
-/// Bus errors and Ctrl-C. A node without a sign of life has `is_present: false`.
+/// Bus errors and Ctrl-C. A node that sends and answers nothing has `is_present: false`.
 pub fn states(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<StateReport>, MasterError> {
     let mut watch = LifeWatch::default();
     let sources = sources(master, nodes)?;
@@ -338,7 +339,7 @@ fn after_change(
     let is_open = |node: &NodeId| !watch.lives.contains_key(node) && !guarded.contains_key(node);
     let silent: Vec<NodeId> = nodes.iter().copied().filter(is_open).collect();
     let requests = silent.iter().map(|&node| Request::read(node, HEARTBEAT_TIME)).collect();
-    // Heartbeats that arrive in this time are used, too.
+    // Heartbeats that arrive in this time are also used.
     let answers = master.transfer(requests, &mut |received| watch.on_frame(received))?;
     let has_no_answer = |answer: &Result<_, crate::master::SdoError>| {
         answer.as_ref().is_err_and(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }))

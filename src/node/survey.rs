@@ -285,7 +285,7 @@ fn read_tpdos<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<
         .collect();
     let mut words = reader.values(&items)?.into_iter();
     for ((&(at, number, cob_id), values), &count) in found.iter().zip(values.chunks(3)).zip(&counts) {
-        // All words of this TPDO are taken, also after a missing one: the next words belong to the next TPDO.
+        // Reads all words of this TPDO, even if one is missing. The next words belong to the next TPDO.
         let own: Vec<Option<u32>> = entries(count).map(|_| unsigned(words.next().flatten().as_ref())).collect();
         let mapping: Option<Vec<MappingEntry>> =
             own.into_iter().map(|word| word.map(MappingEntry::from_word)).collect();

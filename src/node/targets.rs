@@ -1,8 +1,8 @@
 //! The nodes that `all` selects.
 //!
-//! These are the nodes that a scan finds, and those with another sign of life during the scan. Signs of life are a
-//! heartbeat, a boot-up message, a TPDO, or a late answer. Nodes that answer only some requests are included. The
-//! command must succeed with each node or report its failure: no node is omitted silently.
+//! These are the nodes that a scan finds, and those that send a heartbeat, a boot-up message, a TPDO or a late answer
+//! during the scan. Nodes that answer only some requests are included. The command must succeed with each node or
+//! report its failure: no node is omitted silently.
 
 use super::read::{Item, read_values};
 use super::scan::{self, Presence};
@@ -27,7 +27,7 @@ pub fn all(master: &mut Master<'_>, timeout: Duration, rounds: u32) -> Result<Ve
     Ok(nodes.into_iter().collect())
 }
 
-/// Nodes whose only sign of life is a TPDO.
+/// Nodes that were detected only by a TPDO.
 ///
 /// The identifier may belong to a TPDO of another node. So the TPDOs of the answering nodes are read first.
 fn nodes_by_tpdo(master: &mut Master<'_>, presence: &Presence) -> Result<Vec<NodeId>, Error> {

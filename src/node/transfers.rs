@@ -22,7 +22,7 @@ const READ_TIMEOUT: Duration = Duration::from_secs(2);
 /// A write without frames for this time has ended. Storing to non-volatile memory takes the longest time.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// A master that sends another request earlier than this did not wait for its answer: two masters use the channel.
+/// If the next request follows within this time, the master did not wait for its answer: two masters use the channel.
 const SHORTEST_TIMEOUT: Duration = Duration::from_millis(20);
 
 /// The largest number of transfers in progress. A scan starts 127.
@@ -269,7 +269,8 @@ impl Transfers {
         answers.on_answer(received.frame, operation, Some(requested.mono), received.at.mono);
     }
 
-    /// Handles an answer without a request. Two devices, or a bridge that repeats frames, send two answers to one.
+    /// Handles an answer without a request. Two devices, or a bridge that repeats frames, send two answers to one
+    /// request.
     fn on_stray_answer(&mut self, node: NodeId, received: &Received) {
         let Some(object) = multiplexer(received.frame.data()) else { return };
         let answers = self.answers.entry(node).or_default();

@@ -9,7 +9,7 @@ use std::io::{self, Write};
 /// The longest name in a DBC file.
 const MAX_NAME: usize = 32;
 
-/// Bit 31 of an identifier in a DBC file, which means 29 bits.
+/// Bit 31 of an identifier in a DBC file: set for a 29-bit identifier.
 const EXTENDED: u32 = 0x8000_0000;
 
 /// Writes a DBC file.

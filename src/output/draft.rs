@@ -111,7 +111,7 @@ fn signal_entry(draft: &Draft, signal: &Signal, names: &mut BTreeSet<String>) ->
 fn object_entry(draft: &Draft, found: &DraftObject, names: &mut BTreeSet<String>) -> String {
     let object = found.object;
     let fallback = object_name(object);
-    // The name of a run belongs to several objects, so `at` contains the run, which numbers them.
+    // Numbered objects share a name, so `at` is a range of sub-indices. A range adds the number to the name.
     let (at, name) = match &found.name {
         Some(name) if found.is_numbered && object.sub > 0 => {
             let plain = free(name, &fallback, &mut BTreeSet::new());

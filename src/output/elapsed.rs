@@ -41,7 +41,7 @@ impl Elapsed {
         let (last_us, last) = self.last.unwrap_or((self.start_us, at.mono));
         let mono_us = micros(at.mono.since(last)) - micros(last.since(at.mono));
         let wall_us = micros(at.wall.since_epoch()) - last_us;
-        // The event is written with its wall time, so both must agree unless the clock was set.
+        // The event is written with its wall time, so the elapsed time follows the wall time, unless the clock was set.
         let passed = if (wall_us - mono_us).abs() > CLOCK_STEP_US { mono_us } else { wall_us };
         Duration::from_micros(u64::try_from(last_us + passed - self.start_us).unwrap_or(0))
     }

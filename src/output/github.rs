@@ -42,7 +42,7 @@ pub fn summary(report: &CheckReport) -> String {
     text
 }
 
-/// Text without a meaning in Markdown or HTML.
+/// Escapes a text, so that none of its characters has a meaning in Markdown or HTML.
 fn literal(text: &str) -> String {
     let escape = |letter: char| match letter {
         '|' | '<' | '>' | '&' | '`' | '*' | '_' | '~' | '[' | ']' | '\\' | '$' | '@' | '#' => {

@@ -18,8 +18,8 @@ const PARTS: usize = 20;
 /// From the lowest to the highest value.
 const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// If a node has more signals than this, so many of its signals are printed on one line. On a narrow terminal, half or
-/// a quarter of this number is used.
+/// If a node has more signals than this, each line shows this number of its signals. On a narrow terminal, half or a
+/// quarter of this number is used.
 const SIGNALS_IN_LINE: usize = 8;
 
 /// What is known about a running recording.

@@ -232,14 +232,14 @@ fn value_words(message: &SdoMessage) -> String {
     }
 }
 
-/// The unit of the value of an object. A measured integer has a unit only with its decimal digits.
+/// The unit of the value of an object. A measured integer gets no unit, because it is shown without its decimal digits.
 fn unit(message: &SdoMessage) -> Option<&str> {
     let is_real = matches!(message.value, Some(Value::Real32(_) | Value::Real64(_)));
     let measured = message.sample.as_ref().map(|(source, _)| &*source.unit).filter(|unit| is_real && !unit.is_empty());
     message.unit.as_deref().or(measured)
 }
 
-/// The number in a message, as far as it has one.
+/// The number in a message, if there is one.
 fn value(content: &Content) -> Cell {
     match content {
         Content::State(state) | Content::Guarded(state, _) => state.to_string().into(),

@@ -56,7 +56,7 @@ impl Plot {
             if curve.points.is_empty() {
                 continue;
             }
-            // Numbers without a unit have nothing in common, except those of the same signal.
+            // Values without a unit share a panel only if they belong to the same signal.
             let has_unit = !curve.unit.is_empty() && curve.unit != "code";
             let name = if has_unit { curve.unit.clone() } else { format!(" {}", curve.signal) };
             let place = names.iter().position(|known| *known == name).unwrap_or(names.len());
@@ -69,7 +69,7 @@ impl Plot {
         let first = span[0].or(times().map(|point| point.at).min())?;
         let last = span[1].or(times().map(|point| point.at).max())?;
         let events = recording.events.into_iter().filter(|event| (first..=last).contains(&event.at)).collect();
-        // A single value is in the middle of a second.
+        // For a single value, the time axis is one second long.
         let span = if first < last { (first, last) } else { (first - 500_000, last + 500_000) };
         let panels: Vec<Panel> = units.into_values().map(Panel::new).collect();
         (!panels.is_empty()).then_some(Plot { title, axis, span, panels, events })

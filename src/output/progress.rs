@@ -12,7 +12,7 @@ use std::io::{self, Write};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// The shortest time over which rows a second are counted.
+/// The rate of rows is measured over at least this time.
 const SECOND: Duration = Duration::from_secs(1);
 
 /// Redraws per second.
@@ -106,8 +106,7 @@ impl Progress {
     }
 }
 
-/// The terminal on stderr. Lines end with a line end and not with spaces up to the edge, so that a terminal of another
-/// width does not join them.
+/// The terminal on stderr. Lines are not filled with spaces: a terminal that changes its width would join filled lines.
 #[derive(Debug, Default)]
 struct LineTerminal {
     output: Mutex<ScreenOutput>,

@@ -35,7 +35,7 @@ pub struct Curve {
 pub struct Point {
     /// The time in microseconds.
     pub at: i64,
-    /// The number; not a number if there is none. Without a status, this is a gap.
+    /// The number; NaN if there is none. NaN without a status is a gap.
     pub value: f64,
     /// The status, unless it is `ok`.
     pub status: Option<Status>,
@@ -392,7 +392,7 @@ fn point(at: i64, value: &[u8], word: &[u8]) -> Option<Point> {
 /// The statuses that a plot marks.
 pub(super) const MARKED: [Status; 4] = [Status::OverloadHigh, Status::OverloadLow, Status::Clipped, Status::Invalid];
 
-/// The status of a word; `Some(None)` for `ok` and for no status. `None` if it is no status.
+/// The status of a word; `Some(None)` for `ok` and for no status. `None` if it is not a status.
 fn status(word: &[u8]) -> Option<Option<Status>> {
     if word.is_empty() || word == Status::Ok.as_str().as_bytes() {
         return Some(None);

@@ -172,7 +172,7 @@ impl Bench {
         self.clock
     }
 
-    /// The devices, with their memory of the last run and with a recorder if the bench contains `state` and `record`.
+    /// The devices. With `state`, they have the settings stored in the last run. With `record`, they have a recorder.
     ///
     /// # Errors
     /// The record cannot be written; the file with the memory has another format, or another process uses it.

@@ -1,6 +1,6 @@
 //! Data that only the simulator needs: the measured quantities of a device and facts that no manual contains.
 //!
-//! Some devices have a file in `models/`. A device without a file has moving quantities from its description. So a new
+//! Some devices have a file in `models/`. A device without a file gets changing values from its description. So a new
 //! device needs only a description.
 
 use crate::canopen::id::NodeId;
@@ -66,7 +66,7 @@ pub enum SimState {
     Operational,
 }
 
-/// The form of the course of a simulated quantity.
+/// The waveform of a simulated quantity.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Form {
     /// A sine; with amplitude 0, a constant value.
@@ -78,7 +78,7 @@ pub enum Form {
     Points(std::sync::Arc<[(f64, f64)]>),
 }
 
-/// The course of a simulated quantity: a slow sine with noise.
+/// A simulated quantity: a slow sine with noise.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SimChannel {
@@ -100,7 +100,7 @@ pub struct SimChannel {
     pub end: f64,
     /// The field value (x100h) at the start and at the end of the range; 0 and 10000 if `None` (CiA 404).
     pub field: Option<[f64; 2]>,
-    /// The form of the course.
+    /// The waveform.
     #[serde(skip)]
     pub form: Form,
 }

@@ -9,7 +9,8 @@ use std::time::Duration;
 
 const TYPE: u16 = 0x61a0;
 const CONSTANT: u16 = 0x61a1;
-/// The longest mean that ends with a PDO. After this time, the filter is a moving average (MC1609, 2.2, Filter).
+/// The longest time over which the mean until the next PDO is calculated. After this time, the filter is a moving
+/// average (MC1609, 2.2, Filter).
 const MAX_LENGTH: Duration = Duration::from_millis(1000);
 /// A moving average no longer depends on samples older than this multiple of its constant.
 const FORGOTTEN: u64 = 40;

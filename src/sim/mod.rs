@@ -1,8 +1,8 @@
 //! Simulated devices, built from the device descriptions: object dictionary, SDO server, NMT, heartbeat, TPDOs,
-//! emergencies, LSS and moving quantities.
+//! emergencies, LSS and measured values that change.
 //!
-//! Written from CiA 301, CiA 404 and the manuals, without the encoders of the client. A shared mistake would stay
-//! hidden. No code depends on the name of a device: the descriptions and the files in `models/` contain the
+//! Written from CiA 301, CiA 404 and the manuals, without the encoders of the client, so that tests find a mistake in
+//! either. No code depends on the name of a device: the descriptions and the files in `models/` contain the
 //! differences.
 //!
 //! A device is a [`Station`](crate::bus::memory::Station) on a [`MemoryBus`](crate::bus::memory::MemoryBus) or, through

@@ -177,7 +177,8 @@ impl Quantity {
     }
 }
 
-/// The value at a time: on the line between two points, that of the first before them, that of the last after them.
+/// The value at a time, interpolated between two points. Before the first point and after the last one, the value is
+/// constant.
 fn between(points: &[(f64, f64)], seconds: f64) -> f64 {
     let next = points.partition_point(|(at, _)| *at <= seconds);
     match (next.checked_sub(1).and_then(|last| points.get(last)), points.get(next)) {

@@ -6,7 +6,7 @@
 //! - 5 % for the total offset
 //! - 0.5 % for the variation of the readings
 //!
-//! A larger limit from the user applies to the total offset, too.
+//! A larger limit from the user also applies to the total offset.
 
 mod channel;
 mod failure;

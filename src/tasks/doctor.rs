@@ -72,7 +72,7 @@ pub enum FindingCause {
     NoNode,
     /// No node answers, but a device without a node-ID does (LSS).
     Unconfigured,
-    /// The node sends nothing and does not answer; these nodes are on the bus.
+    /// The node sends nothing and does not answer. The list contains the nodes that are on the bus.
     Absent(Vec<NodeId>),
     /// The node sends heartbeats with this state, but does not answer SDO requests.
     OnlyHeartbeat(NmtState),
@@ -116,7 +116,7 @@ impl Examination {
     }
 
     fn silent(&mut self, node: NodeId, signal: Option<String>, silence: Silence) {
-        // A node that sends other signals is not silent if a value does not change.
+        // If a value does not change, its TPDO is not sent. This is not a problem if the node sends other signals.
         let is_normal = signal.is_some()
             && silence.running == Running::Operational
             && matches!(
@@ -173,7 +173,7 @@ fn examine_bus(master: &mut Master<'_>, options: &DoctorOptions, examination: &m
     if options.passive { Ok(()) } else { read_values(master, options, &answering, examination) }
 }
 
-/// The problem of a node that sends heartbeats or another sign of life, but does not answer.
+/// The problem of a node that sends frames but does not answer.
 fn only_heartbeat(state: Option<NmtState>) -> FindingCause {
     match state {
         Some(NmtState::Stopped) => FindingCause::Silent(Box::new(not_operational(NmtState::Stopped))),
@@ -278,7 +278,7 @@ fn record(
             return Ok(());
         }
     };
-    // Frames of the nodes were received before, so a recording without TPDOs does not mean that nothing was received.
+    // The nodes have sent frames before. So a recording without TPDOs only means that no TPDO was received.
     let nothing = report.nothing.filter(|failure| {
         let is_unheard = matches!(failure.cause, Cause::Log(LogFailure::NothingReceived { .. }));
         for &node in nodes.iter().filter(|_| is_unheard) {

@@ -1,6 +1,7 @@
 //! The figures of a running bus: load, faults, heartbeat intervals and SDO answer times.
 //!
-//! Frames are interpreted as in [`super::monitor`]. Own reads are counted like those of other masters.
+//! Frames are interpreted as in [`super::monitor`]. The reads of this program are counted like those
+//! of other masters.
 
 mod figures;
 mod load;

@@ -1,4 +1,4 @@
-//! The interface of this computer: why it was not set.
+//! Why an interface of this computer could not be configured.
 
 use super::Failure;
 use super::failure::BusError;
@@ -33,7 +33,7 @@ pub enum HostAction {
 pub enum HostFailure {
     /// The program lacks the privilege (CAP_NET_ADMIN).
     NotPermitted {
-        /// The action without privilege: `set the bit rate of can0`.
+        /// The action that needs the privilege: `set the bit rate of can0`.
         what: String,
         /// The action.
         action: HostAction,

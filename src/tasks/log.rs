@@ -333,7 +333,7 @@ pub(super) fn compare_values(master: &mut Master<'_>, node: &Node) -> Result<Res
     let entries = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).flat_map(|tpdo| &tpdo.mapping);
     let requests: Vec<Request> = entries.map(|entry| Request::read(node.id, entry.object)).collect();
     for result in master.transfer(requests, &mut |_| {})? {
-        // A value that cannot be read is no evidence.
+        // A value that cannot be read is not evidence.
         if let Err(error @ SdoError { failure: SdoFailure::TwoDevices(_), .. }) = result {
             return Ok(Err(error));
         }

@@ -116,7 +116,7 @@ pub enum Fact {
     LeftOperational,
     /// The device accepted a number that its description does not allow.
     Rule(Box<Rule>),
-    /// A signal is sent as an integer that is too narrow for its measuring range.
+    /// A signal is sent as an integer whose limits are smaller than the measuring range.
     MayClip(NarrowValue),
     /// An autozero succeeded.
     Autozero(AutozeroFact),

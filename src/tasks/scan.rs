@@ -103,7 +103,7 @@ pub fn listen(
     Ok(found)
 }
 
-/// The requested nodes with a sign of life, in ascending order.
+/// The requested nodes that were detected, in ascending order.
 fn found(presence: &Presence, nodes: &[NodeId]) -> Vec<Found> {
     let of_node = |node| Found::new(node, presence.state(node));
     presence.nodes().into_iter().filter(|node| nodes.contains(node)).map(of_node).collect()

@@ -19,7 +19,7 @@ const PAIRS: u32 = 3;
 /// The frames of such a pair arrive within this part of the SYNC interval.
 const PAIR_PART: u32 = 4;
 
-/// After this many SYNC messages of another node for a TPDO, a second sender would have been found.
+/// A second sender of a TPDO is detected within this number of SYNC messages of another node.
 const SETTLED_SYNCS: u64 = FOREIGN_TOLERANCE + 2;
 
 /// A TPDO that arrived without a SYNC for it.
@@ -85,7 +85,7 @@ impl SyncedTpdo {
         self.syncs > 0 && (self.received >= due || self.is_shared)
     }
 
-    /// Whether a second sender would have been found.
+    /// Whether enough SYNC messages were received to detect a second sender.
     fn is_settled(&self) -> bool {
         self.last.is_none() || self.syncs >= self.every.map_or(u64::from(PAIRS) + 1, |every| every * SETTLED_SYNCS)
     }
@@ -151,12 +151,13 @@ impl SyncedTpdos {
         self.tpdos.values_mut().filter(|tpdo| tpdo.sync == id).for_each(|tpdo| tpdo.on_sync(at));
     }
 
-    /// Whether another node may send the SYNC for this TPDO, and a second sender would not have been found yet.
+    /// Whether this TPDO may still have a second sender that is not detected yet. This is so only if another node may
+    /// send SYNC.
     pub(super) fn is_open(&self, id: CanId) -> bool {
         !self.is_producer && self.tpdos.get(&id).is_some_and(|tpdo| !tpdo.is_settled())
     }
 
-    /// Whether a second sender would have been found for each TPDO that was received.
+    /// Whether enough SYNC messages were received to detect a second sender of each received TPDO.
     pub(super) fn is_settled(&self) -> bool {
         self.is_producer || self.tpdos.values().all(SyncedTpdo::is_settled)
     }

@@ -1,4 +1,4 @@
-"""Devices whose values are easily misread: unknown types, narrow integers, wrong lengths, overloads."""
+"""Devices whose values are easily misread: unknown types, integers that clip, wrong lengths, overloads."""
 
 from device import Device, real, sint, uint
 from table import case
@@ -167,10 +167,10 @@ class MappingOfThreeBytesOfTwo(MappingLongerThanItsObject):
         return bytes(range(1, 4))
 
 
-# A narrow integer at its end is not a value.
+# An integer that is the limit of its type is not a value.
 
 class Narrow(Device):
-    """An MH-4-CAN in psi whose TPDO1 has a narrow integer."""
+    """An MH-4-CAN in psi whose TPDO1 has an integer that clips."""
 
     def change(self):
         self.objects[0x1000, 0] = uint(0x00820194, 4)

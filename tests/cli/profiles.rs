@@ -273,7 +273,7 @@ fn values_by_address_are_read_as_the_signal() {
     for signal in ["0x6130:1", "0x6140:1", "ch1.net"] {
         check(&invalid, "5", &format!("{signal} < 100")).exit(1);
     }
-    // An integer at the end of its type.
+    // An integer that is the limit of its type.
     let clipped = bench_of(&[("0x7130:1", "i16", "ro", "32767"), ("0x7140:1", "i16", "ro", "32767")], &["0x71300110"]);
     for signal in ["0x7130:1", "0x7140:1", "ch1.net"] {
         check(&clipped, "5", &format!("{signal} < 90 bar")).exit(1);

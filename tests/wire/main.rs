@@ -255,7 +255,7 @@ impl Case {
             },
             Machine::Sent => None,
             Machine::Life(node) => {
-                let (of, life) = Life::parse(frame).expect("a sign of life");
+                let (of, life) = Life::parse(frame).expect("a heartbeat or boot-up message");
                 assert_eq!(of, *node, "{frame}");
                 self.heard.push(match life {
                     Life::BootUp => "boot-up".to_owned(),

@@ -35,8 +35,9 @@ pub struct Claims {
 }
 
 impl Claims {
-    /// Claims the parts of `claim` on the interface `name`; all names of an interface count as one. `report` is called
-    /// for the first wait longer than half a second, and for each holder that is ignored.
+    /// Claims the parts of `claim` on the interface `name`. An interface may have several names (altname): its claims
+    /// are the same under each of them. `report` is called for the first wait longer than half a second, and for each
+    /// holder that is ignored.
     ///
     /// # Errors
     /// [`ClaimError::InUse`] after the waiting time; an interrupt; a failure of the system. If the system does not

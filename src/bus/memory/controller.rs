@@ -6,8 +6,8 @@ use crate::bus::time::Mono;
 use crate::canopen::wire_length::bit_time;
 use std::time::Duration;
 
-/// The wait of an error-passive controller before a retry. A real controller waits a few bit times. The longer wait
-/// limits the number of errors from an unacknowledged frame in hours of virtual time.
+/// The wait of an error-passive controller before a retry. A real controller waits a few bit times. With this longer
+/// wait, a frame without acknowledgement causes fewer errors in hours of virtual time.
 pub(super) const PASSIVE_PAUSE: Duration = Duration::from_millis(10);
 
 const WARNING: u16 = 96;

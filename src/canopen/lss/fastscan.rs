@@ -232,7 +232,7 @@ impl Fastscan {
             self.number &= u32::MAX.checked_shl(above.into()).unwrap_or(0);
             self.phase = Phase::Bit(top);
         } else {
-            // The previous check may have been passed by a late answer, or slaves answer slowly.
+            // A late answer may have made the previous check succeed, or the slaves answer slowly.
             self.has_several_answers = true;
             self.search();
         }

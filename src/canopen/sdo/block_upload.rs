@@ -148,8 +148,8 @@ impl BlockUpload {
     /// Otherwise aborts the transfer. `None` means that the transfer continues.
     pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> Option<TransferError> {
         if let State::SubBlock { taken, acknowledged, .. } = self.state {
-            // If no segment came, either the block or the previous acknowledgement was lost. The position of the server
-            // is the same in both cases only if the previous acknowledgement was 0.
+            // If no segment was received, either the block or our last acknowledgement was lost. A new acknowledgement
+            // is right in both cases only if the last one was 0.
             let unambiguous = taken > 0 || acknowledged == 0;
             let provable = self.crc || self.announced.is_some();
             if unambiguous && provable && self.setbacks < MAX_STALLED_BLOCKS {

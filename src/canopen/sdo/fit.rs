@@ -21,7 +21,7 @@ pub struct Fitted {
 pub enum Note {
     /// The type is unknown and the device did not indicate the size.
     SizeNotIndicated,
-    /// More bytes than the type has; the excess is zero or the sign.
+    /// More bytes than the type has; the excess bytes are zeros or the sign extension.
     Wider {
         /// Bytes of the type.
         expected: usize,
@@ -42,7 +42,7 @@ pub enum Note {
         /// Bytes delivered.
         found: usize,
     },
-    /// A segment before the last one was not full, twice in the same way.
+    /// A segment before the last one was not full, in both reads of the object.
     ShortSegment,
     /// The end frame of a block transfer declares the last segment invalid, but size and CRC include the segment.
     WrongEnd,

@@ -140,7 +140,7 @@ fn number(data: &[u8]) -> Option<u32> {
 
 /// The abort code of a frame that aborts the transfer of `object`. A truncated code reads as 0.
 ///
-/// An abort with the identifier of the request counts, too. The D-20-9 manual (page 7) shows such an abort, and an
+/// An abort with the identifier of the request also counts. The D-20-9 manual (page 7) shows such an abort, and an
 /// abort of another master also ends the transfer.
 fn abort_of(frame: &Frame, node: NodeId, object: ObjectId) -> Option<AbortCode> {
     let here = frame.id() == CanId::sdo_response(node) || frame.id() == CanId::sdo_request(node);

@@ -355,7 +355,7 @@ fn split(results: Vec<Result<Outcome, Vec<Failure>>>) -> Results {
     (done, failures)
 }
 
-/// Whether a failure concerns the devices that follow, too.
+/// Whether a failure also concerns the devices that follow.
 fn ends_all(failure: &Failure) -> bool {
     matches!(failure.kind(), Kind::Interrupted | Kind::Bus)
 }

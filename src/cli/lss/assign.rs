@@ -132,7 +132,7 @@ impl RateOptions {
     }
 }
 
-/// Node-ID and bit rate to set, and whether the host changes its bit rate, too.
+/// Node-ID and bit rate to set, and whether the host also changes its bit rate.
 #[derive(Clone, Copy, Debug)]
 struct Values {
     id: Option<NodeId>,

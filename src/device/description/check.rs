@@ -97,7 +97,7 @@ fn objects(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
             }
         }
         let subs = (entry.at.is_run, entry.at.first.index);
-        // Runs of one name may share an index: `ai-input-pv:1` and `ai-input-pv:2` are different names.
+        // Two ranges may share a name only at the same index. The sub-index makes the names different: `ai-input-pv:1`.
         if names.insert(&entry.name, subs).is_some_and(|other| other != subs || !entry.at.is_run) {
             table.mistake("name", format!("name: two objects have the name \"{}\"", entry.name));
         }

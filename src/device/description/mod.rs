@@ -281,7 +281,8 @@ pub struct SignalEntry {
     pub marker: bool,
     /// Other numbers that replace the value.
     pub markers: Markers,
-    /// Whether the manual warns that narrow integers may be clipped. Their largest number is then not a value.
+    /// Whether the manual warns that integers of 8, 16 or 24 bits may be clipped. Their largest number is then not a
+    /// value.
     pub may_clip: bool,
     /// The object with the start of the measuring range (6148h), if the device has it.
     pub span_start: Option<ObjectId>,
@@ -371,8 +372,8 @@ impl Description {
     }
 }
 
-/// The meaning of an emergency on a device with this description: the text for its code, and the set bits of its error
-/// register, unless the device always sends the same register with this code.
+/// The meaning of an emergency on a device with this description: the text of its code, and the set bits of its error
+/// register. The bits are omitted if the device always sends the same register with this code.
 pub fn emergency_text(description: Option<&Description>, emergency: Emergency) -> String {
     let described = description.and_then(|description| description.emergency(emergency.code));
     let text = described.map_or_else(|| Emergency::class(emergency.code), |entry| &entry.text).to_owned();

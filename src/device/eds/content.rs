@@ -43,7 +43,7 @@ impl Content {
         }
     }
 
-    /// An unsigned setting of so many bytes.
+    /// An unsigned setting with this number of bytes.
     pub(super) fn setting(bytes: u8, default: Option<Scalar>) -> Content {
         let data_type = DataType::Unsigned(bytes);
         Content { data_type, access: Access::Rw, default, ..Content::count(None) }

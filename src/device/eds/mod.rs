@@ -50,7 +50,7 @@ pub struct Eds {
 /// `[DeviceInfo]`, and the version from `[FileInfo]`. `None` for a missing or empty key.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Info {
-    /// Version of the EDS format; 3.0 if the file gives none (CiA 306).
+    /// Version of the EDS format; 3.0 if the file does not contain it (CiA 306).
     pub eds_version: String,
     /// The manufacturer.
     pub vendor_name: Option<String>,

@@ -147,7 +147,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The PDO parameters without a section of their own, if the file describes its PDOs by `CompactPDO` (CiA 306).
+    /// The PDO parameters without a section, if the file describes its PDOs by `CompactPDO` (CiA 306).
     fn compact_pdos(&mut self, parts: &BTreeMap<u16, Parts>) {
         let Some(section) = self.ini.section("deviceinfo") else { return };
         let Some(mask) = number(section, "compactpdo").filter(|mask| *mask > 0) else { return };
@@ -160,7 +160,7 @@ impl Reader<'_> {
                 if !described(object.index) {
                     self.objects.names.insert(object.index, format!("{title} {} communication parameter", pdo + 1));
                     let default = Scalar::NodeIdPlus(cob_id + 0x100 * u32::from(pdo));
-                    // Only four PDOs have an identifier of their own; the others are off.
+                    // Only four PDOs have a default identifier; the others are off.
                     let default = if pdo < 4 { default } else { Scalar::Integer(1 << 31) };
                     let is_in_mask = |sub: u8| sub <= 2 || mask >> (sub - 1) & 1 == 1;
                     let last = (1..=6).rev().find(|sub| is_in_mask(*sub));

@@ -86,7 +86,7 @@ fn mh4_real_with_status() {
     assert_eq!(rows(&mh4, &[], "181#0000C07F05"), [row("pressure", "", "overload-low")]);
     assert_eq!(rows(&mh4, &[], "181#0000C07F00"), [row("pressure", "", "invalid")]);
     assert_eq!(rows(&mh4, &[], "181#0000803F01"), [row("pressure", "", "invalid")]);
-    // A length that differs from the mapping, a remote request, or a 29-bit identifier gives no row.
+    // A frame yields no row if its length differs from the mapping, it is a remote request, or it has 29 bits.
     for other in ["181#", "181#0000803F", "181#0000803F0000", "181#R5", "00000181#0000803F00", "182#0000803F00"] {
         assert_eq!(rows(&mh4, &[], other), [], "{other}");
     }
@@ -168,7 +168,7 @@ fn shared_cob_id_yields_no_samples() {
         assert!(matches!(decoder.decode(&received, &mut samples), Decoded::Paused(_)) && samples.is_empty());
         assert_eq!(decoder.shared_cob_id(CanId::Standard(0x181)), Some([(one.id, number(1)), (one.id, number(2))]));
     }
-    // A TPDO without a mapping is no second sender.
+    // A TPDO without a mapping is not a second sender.
     let mut empty = one.clone();
     empty.tpdos.insert(0, Tpdo { number: number(2), mapping: Vec::new(), ..one.tpdos[0].clone() });
     let mut decoder = Decoder::default();

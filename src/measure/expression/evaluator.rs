@@ -232,7 +232,7 @@ fn routes(comparisons: &[Comparison], source: &Source) -> Vec<Route> {
                 continue;
             }
             let unit = match (unit_of(source), known.unit) {
-                // If the expected unit is unknown, the expression uses none.
+                // If the unit was unknown when the expression was bound, the value is not converted.
                 (_, None) => UnitChange::Unchanged,
                 (now, then) if now == then => UnitChange::Unchanged,
                 (Some(now), Some(then)) if now.convert(0.0, then).is_some() => UnitChange::Convertible(now, then),

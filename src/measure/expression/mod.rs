@@ -37,7 +37,7 @@ use tree::{Condition, Position, SignalName};
 /// The longest expression, in characters. It limits how deeply the tree can be nested.
 const MAX_LENGTH: usize = 1000;
 
-/// The prefixes of figures of the bus and of a node, which are no signals of a device: `bus.load`.
+/// The prefixes of figures of the bus and of a node, which are not signals of a device: `bus.load`.
 const FIGURES: [&str; 2] = ["bus.", "node."];
 
 /// An expression: one or several conditions that must all be true.

@@ -420,7 +420,7 @@ fn several_signals_are_compared_when_each_has_a_new_value() {
     let result = verdict("5.p - 6.p == 0", &two);
     assert_eq!((result.outcome, result.count), (Outcome::Ok, 100));
     assert_eq!(verdict("mean(5.p - 6.p) == 0", &two).count, 100);
-    // Each sample of the faster signal is compared, too.
+    // Each sample of the faster signal is also compared.
     let quick = [1.0, 1.0, 9.0, 1.0, 1.0];
     let uneven = [("5.p", "bar", &quick[..]), ("6.p", "bar", &[1.0])];
     assert_eq!(verdict("5.p - 6.p < 1", &uneven).violations, 1);

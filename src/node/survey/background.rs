@@ -20,7 +20,7 @@ pub struct BackgroundSurvey {
     pending: BTreeMap<Ticket, ObjectId>,
     /// The number of consecutive objects without an answer until now.
     silent: u8,
-    /// Whether the survey fails if an object has no valid answer that had one before.
+    /// Whether the survey fails if an object that was answered before has no valid answer now.
     insists: bool,
     /// The optional objects without a valid answer.
     unknown: BTreeSet<ObjectId>,
@@ -73,7 +73,8 @@ impl Ask for Known<'_, '_> {
 }
 
 impl BackgroundSurvey {
-    /// Starts to read `node` again. If it `insists`, an object without a valid answer that had one before is an error.
+    /// Starts to read `node` again. If it `insists`, an object that was answered before and has no valid answer now is
+    /// an error.
     pub fn start(node: NodeId, overrides: &Overrides, insists: bool, master: &mut Master<'_>) -> BackgroundSurvey {
         let own = overrides.iter().filter(|(other, _)| **other == node);
         let overrides = own.map(|(&node, model)| (node, model.clone())).collect();
@@ -96,8 +97,8 @@ impl BackgroundSurvey {
         let error = result.as_ref().err().filter(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }));
         self.silent = if error.is_some() { self.silent + 1 } else { 0 };
         if let Some(error) = error {
-            // The other objects are requested again. After two silent objects in a row, the node must answer an object
-            // that it answered before: its answer is forgotten, so the next run requests it.
+            // The other objects are requested again. After two objects without an answer, the node is tested with an
+            // object that it answered before. The stored answer is removed, so the next run reads the object again.
             master.forget(std::mem::take(&mut self.pending).into_keys());
             let answered = self.answers.iter().find(|(_, answer)| answer.is_ok()).map(|(&object, _)| object);
             let is_known = self.silent > 1 && answered.is_some_and(|object| self.answers.remove(&object).is_some());

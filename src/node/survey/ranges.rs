@@ -9,9 +9,8 @@ use crate::measure::sample::Number;
 use crate::node::Node;
 use crate::node::read::{Item, Reader};
 
-/// Reads the measuring ranges (6148h, 6149h) if a value depends on them. This is an integer that may be too narrow, or
-/// a described signal without a status. A device with integers may have these objects as integers only (7148h to
-/// 9149h).
+/// Reads the measuring ranges (6148h, 6149h) if a value depends on them. This is an integer of at most 24 bits, or a
+/// described signal without a status. A device with integers may have these objects as integers only (7148h to 9149h).
 pub(super) fn read_ranges<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     read_family(reader, nodes, 0x6000, |_| true)?;
     for family in [0x9000, 0x8000, 0x7000] {
@@ -80,7 +79,7 @@ fn needs_range(node: &Node, signal: &Signal) -> bool {
     lacks_status || is_narrow(signal.value_object.1) || has_narrow_entry(node, signal)
 }
 
-/// Whether a TPDO contains the signal as an integer that may be too narrow.
+/// Whether a TPDO contains the signal as an integer of at most 24 bits, whose range may be too small.
 fn has_narrow_entry(node: &Node, signal: &Signal) -> bool {
     let mut mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
     mapped.any(|entry| signal.is_value(entry.object) && is_narrow(node.mapped_type(entry.object, entry.bits)))

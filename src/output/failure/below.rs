@@ -186,7 +186,7 @@ fn silence_advice(node: NodeId, waited: Duration, started: bool, missed: MissedA
     })
 }
 
-/// The hint for a node without a sign of life; `None` if its node-ID is unknown. `scan` fails on a dead bus, but
+/// The hint for a node that sends nothing; `None` if its node-ID is unknown. `scan` fails on a dead bus, but
 /// `doctor` finds causes.
 pub(super) fn check_node(node: Option<NodeId>) -> String {
     let node = node.map_or_else(|| "all".to_owned(), |node| node.to_string());

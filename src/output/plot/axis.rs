@@ -3,7 +3,7 @@
 /// Microseconds of a second.
 const SECOND: i64 = 1_000_000;
 
-/// The microseconds that local time is ahead of UTC at a time.
+/// The difference between local time and UTC at a given time, in microseconds.
 pub(super) type Zone = fn(i64) -> i64;
 
 /// The labels of the time axis.
@@ -19,7 +19,7 @@ pub enum TimeAxis {
 const STEPS: [i64; 18] =
     [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10_800, 21_600, 43_200, 86_400];
 
-/// Elapsed times from here on have hours and minutes.
+/// Elapsed times of at least this length are labelled with hours and minutes.
 const LONG_TIME: i64 = 120 * SECOND;
 
 impl TimeAxis {

@@ -67,7 +67,7 @@ const MARK: Color = [190, 0, 0];
 const COLORS: [Color; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [0, 0, 0], [86, 180, 233], [230, 159, 0]];
 
-/// Lines and spaces. Curves can be distinguished without colours, too.
+/// Lines and spaces. Curves can also be distinguished without colours.
 const PATTERNS: [&[f64]; 4] = [&[], &[7.0, 3.0], &[1.5, 3.5], &[9.0, 3.0, 1.5, 3.0]];
 
 /// A rectangle in which curves are drawn.
@@ -173,7 +173,7 @@ impl Scene {
         }
         for curve in &panel.curves {
             for (status, x, value) in marks(&curve.points, x, MARK_DISTANCE) {
-                // An invalid value has no place of its own.
+                // An invalid value has no number, so its mark is at the bottom.
                 let y = if status == Status::Invalid { frame.bottom - 6.0 } else { frame.y(panel.place(value)) };
                 self.mark(status, (x, y));
             }

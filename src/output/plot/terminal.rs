@@ -191,7 +191,7 @@ fn draw(plot: &Plot, panel: &Panel, rows: usize, columns: usize) -> (Canvas, Vec
         }
         let all: Vec<&(f64, f64)> = paths.iter().flatten().collect();
         ends.push(all.last().map_or(0.0, |last| (y(last.1) / 4.0).floor()));
-        // Each curve has its name at three places of its own.
+        // The name of each curve is drawn at three places. No two curves use the same place.
         for part in 0..3 {
             let share = (part as f64 + (number as f64 + 0.5) / panel.curves.len() as f64) / 3.0;
             let wanted = share * width;

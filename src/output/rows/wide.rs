@@ -237,7 +237,7 @@ mod tests {
         // The row of this cycle is already written.
         wide.put(Some(1), &sample(31, 1, 9));
         assert_eq!(wide.left_out, 1);
-        // Received in the next cycle, so the time of the row is the start of its own cycle.
+        // Received in the next cycle, so the time of the row is the start of the cycle of the row.
         wide.put(Some(2), &sample(33, 0, 5));
         wide.put(Some(3), &sample(34, 0, 6));
         assert_eq!(drained(&mut wide), ["20: 5 -", "34: 6 -"]);

@@ -292,7 +292,7 @@ pub(in crate::sim) fn value_in(text: &str, own: Unit) -> Option<f64> {
     unit.convert(number.parse().ok()?, own)
 }
 
-/// The points of a CSV file: seconds, value. A first line that is no number is a heading.
+/// The points of a CSV file: seconds, value. A first line that is not a number is a heading.
 fn points(path: &Path) -> Result<Form, BenchError> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (index, line) in read(path)?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {

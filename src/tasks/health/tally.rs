@@ -90,7 +90,7 @@ impl NodeTally {
             Content::Guarded(state, _) => self.state = Some(*state),
             Content::BootUp => {
                 self.restarts += 1;
-                // The time over a restart is no interval.
+                // A time that includes a restart is not an interval.
                 self.last_heartbeat = None;
             }
             Content::Emergency(emergency, meaning) if emergency.code != 0 => {

@@ -329,7 +329,8 @@ impl<'o> Recording<'o> {
         Ok(self.take_samples(cycle, observer))
     }
 
-    /// If another node may send SYNC, keeps the first values until a second device would have been found.
+    /// If another node may send SYNC, keeps the first values until enough SYNC messages were received to detect a
+    /// second device.
     fn keep_early(
         &mut self,
         frame: &Frame,

@@ -20,7 +20,8 @@ use std::time::Duration;
 const WRITE_SETTLE_TIME: Duration = Duration::from_millis(500);
 /// Interval between two attempts to read a node that does not answer.
 const RETRY_INTERVAL: Duration = Duration::from_secs(1);
-/// The number of attempts that fail if the node does not answer an object that it answered before.
+/// In this number of attempts, every object that was answered before must be answered again. Later attempts accept a
+/// missing answer.
 const COMPLETE_ATTEMPTS: u32 = 5;
 /// Shortest interval between two rereads of a node because frames were lost. An overloaded bus loses frames all the
 /// time.

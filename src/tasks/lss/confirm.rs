@@ -12,7 +12,8 @@ use crate::tasks::Failure;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The longest wait for a boot-up message. No manual gives a time, and a device may write its memory before.
+/// The longest wait for a boot-up message. No manual gives a time. A device may first write its
+/// non-volatile memory.
 const BOOT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// How long requests are repeated after the boot-up message. Some devices do not answer for 2 to 3 s.

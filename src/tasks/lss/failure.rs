@@ -57,7 +57,7 @@ pub enum LssCause {
     Taken(NodeId, TakenSign),
     /// The objects of this device are unknown.
     ObjectsUnknown,
-    /// SDO does not reach the device, or reaches other devices, too.
+    /// SDO does not reach the device, or also reaches other devices.
     ObjectsOutOfReach,
     /// No object is known for this setting.
     NoObject(Setting),

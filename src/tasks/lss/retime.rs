@@ -31,7 +31,7 @@ const DELAY: Duration = Duration::from_millis(DELAY_MS as u64);
 /// Additional time for clocks and the interface.
 const MARGIN: Duration = Duration::from_millis(50);
 
-/// How long a device is searched at a bit rate.
+/// How long to wait for an answer of the device at a bit rate.
 const SEARCH_TIME: Duration = Duration::from_secs(4);
 
 /// Whether the device may change to a bit rate different from that of the host.
@@ -138,7 +138,7 @@ impl<'a> Retiming<'a> {
         .map(|_| ())
     }
 
-    /// Changes the host to the new bit rate and searches the device.
+    /// Sets the host to the new bit rate, and waits until the device answers.
     fn follow(&self, master: &mut Master<'_>, start: Mono) -> Result<(), Failure> {
         // No node acknowledges frames at a wrong bit rate.
         master.set_tolerates_outages(true);
@@ -151,7 +151,7 @@ impl<'a> Retiming<'a> {
         Err(self.device.failure(LssCause::SilentAtRate(self.new)))
     }
 
-    /// Changes the host back to the old bit rate, and searches the device.
+    /// Sets the host to the old bit rate again, and waits until the device answers.
     fn go_back(
         &self,
         master: &mut Master<'_>,

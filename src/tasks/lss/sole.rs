@@ -105,8 +105,8 @@ fn ask_all(lss: &mut Lss<'_, '_>, known: Option<LssAddress>) -> Result<SlaveAnsw
     }
     let address = <[u32; 4]>::try_from(numbers).ok().map(LssAddress::new);
     let mut answers = SlaveAnswers { address, ..SlaveAnswers::default() };
-    // On the bus, equal answers merge and different answers collide. So slaves with other numbers are searched by
-    // identification.
+    // On the bus, equal answers merge and different answers collide. So the LSS service "identify" searches for slaves
+    // with other numbers.
     if let Some(address) = address.or(known) {
         match lss.others(&address)? {
             Others::None => {}

@@ -97,7 +97,7 @@ pub struct Entry {
     pub node: Option<NodeId>,
     /// Its kind.
     pub kind: FrameKind,
-    /// The COB-ID of the frame; `None` for an SDO transfer and for events that are no frame.
+    /// The COB-ID of the frame; `None` for an SDO transfer and for events that are not frames.
     pub id: Option<CanId>,
     /// The data of the frame.
     pub data: Vec<u8>,
@@ -114,7 +114,7 @@ impl Entry {
         Entry { at: received.at, node, kind, id, data, is_repeated: false, content }
     }
 
-    /// An event that is no frame.
+    /// An event that is not a frame.
     pub(super) fn of_bus(at: Stamp, content: Content) -> Entry {
         Entry { at, node: None, kind: FrameKind::Error, id: None, data: Vec::new(), is_repeated: false, content }
     }

@@ -61,7 +61,7 @@ struct Guarding {
 }
 
 impl Interpreter {
-    /// Interprets with these descriptions of the user, and those of recognised devices.
+    /// An interpreter that uses the descriptions of the user and those of recognised devices.
     pub fn new(overrides: &Overrides, recognised: Overrides) -> Interpreter {
         let all: Vec<NodeId> = NodeId::all().collect();
         let mut interpreter = Interpreter {

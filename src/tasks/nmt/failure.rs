@@ -14,7 +14,7 @@ pub enum NmtFailure {
         /// The state that was requested.
         wanted: NmtState,
     },
-    /// The node showed no sign of life after the command.
+    /// The node sent and answered nothing after the command.
     NoSign,
     /// No boot-up message came after a reset.
     NoBootUp,

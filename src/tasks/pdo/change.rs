@@ -17,7 +17,8 @@ use std::time::Duration;
 /// The longest wait for a device that restarts.
 const BOOT_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// The number of Ctrl-C that are ignored while the old settings are restored. Each one costs one exchange.
+/// The number of Ctrl-C that are ignored while the old settings are restored. Each one interrupts one SDO
+/// transfer.
 const MAX_INTERRUPTS: u32 = 5;
 
 /// A change in progress.
@@ -193,7 +194,7 @@ impl Change<'_, '_> {
                 Err(StepError::Interrupted) if interrupts_left > 0 => interrupts_left -= 1,
                 Err(last @ (StepError::Lost(_) | StepError::Restarted)) if !has_waited => {
                     has_waited = true;
-                    // Repeated even without a sign of life, because devices without heartbeat also need this time to
+                    // Tries again even if the node sends nothing: a device without heartbeat also needs this time to
                     // boot.
                     if !self.session.has_restarted && self.session.wait_for_life(BOOT_TIMEOUT).is_err() {
                         break last;

@@ -2,7 +2,7 @@
 //!
 //! A mapping is changed in the order of CiA 301 (7.5.2.37, 7.5.2.38): switch the PDO off, set the number of entries to
 //! 0, write the entries, their number and the other parameters, switch the PDO on. Then the new settings are read back.
-//! If a step fails, the old settings are restored. If neither is possible, the failure describes the present state.
+//! If a step fails, the old settings are restored. If this also fails, the failure describes the present state.
 
 mod change;
 mod failure;

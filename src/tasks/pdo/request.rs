@@ -60,7 +60,7 @@ pub struct PdoRequest {
 }
 
 impl PdoRequest {
-    /// Checks the length, as far as the items contain their bits, and the identifier. Needs no bus.
+    /// Checks the identifier, and the length if the items contain their number of bits. Needs no bus.
     ///
     /// # Errors
     /// [`PdoFailure::TooLong`], [`PdoFailure::Restricted`].

@@ -23,7 +23,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The time without a TPDO after which this is reported once.
+/// If no TPDO is received within this time, the reasons are reported once.
 const FIRST_TPDO_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The tolerated delay of a heartbeat, in addition to twice its interval.

@@ -5,7 +5,7 @@ use crate::tasks::Kind;
 /// A scan did not find nodes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ScanFailure {
-    /// No node answered or showed another sign of life.
+    /// No node answered, and none was detected by another frame.
     NoAnswer,
     /// No node sent anything while the program only listened.
     NoFrame,

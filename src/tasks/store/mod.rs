@@ -172,8 +172,8 @@ pub fn plan(master: &mut Master<'_>, device: &Node, group: Group) -> Result<Stor
     Ok(StorePlan { groups, notes })
 }
 
-/// Stores a group of settings. With `verify`, the device is then reset, read again, and set to its previous NMT state;
-/// all settings that it stores must have the same values as before.
+/// Stores a group of settings. With `verify`, the device is then reset and set to its previous NMT state. All settings
+/// that it stores are read again and must be unchanged.
 ///
 /// # Errors
 /// - The device does not store on command, rejects the command or does not answer.

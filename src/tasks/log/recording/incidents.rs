@@ -35,8 +35,8 @@ impl Recording<'_> {
         }
     }
 
-    /// Reports valid TPDOs that cannot be decoded, of nodes with other values. For nodes without values, this is the
-    /// reason at the end.
+    /// Reports valid TPDOs that cannot be decoded, if the node sends other values. If a node sends no values, this is
+    /// reported at the end as the reason.
     fn report_not_decoded(&mut self, at: Stamp, observer: &mut dyn Observer) {
         let with_values = |node: &&Node| self.decoder.sources().iter().any(|source| source.node == node.id);
         let nodes = self.nodes.iter().filter(with_values).filter(|_| self.options.wanted.is_empty());

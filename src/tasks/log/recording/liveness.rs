@@ -70,14 +70,14 @@ impl Liveness {
         self.heartbeats.take(node, life, at)
     }
 
-    /// Restarts the silence of a node, because nothing could be recorded until now.
+    /// Measures the silence of a node from now on, because nothing could be recorded until now.
     pub(super) fn restart(&mut self, node: NodeId, now: Mono) {
         if let Some(liveness) = self.nodes.get_mut(&node) {
             liveness.samples.restart(now);
         }
     }
 
-    /// Restarts the silence of all nodes, because nothing could be received until now.
+    /// Measures the silence of all nodes from now on, because nothing could be received until now.
     pub(super) fn restart_all(&mut self, now: Mono) {
         self.nodes.values_mut().for_each(|liveness| liveness.samples.restart(now));
         self.heartbeats.restart(now);
