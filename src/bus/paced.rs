@@ -85,8 +85,7 @@ impl Load {
     }
 
     fn on_frame(&mut self, frame: &Frame, now: Mono, limit: u8) {
-        let earliest = Mono::at(now.since_start().saturating_sub(CREDIT));
-        self.limit = (self.limit.max(earliest) + self.time(frame, limit)).min(now + LONGEST_WAIT);
+        self.limit = (self.limit.max(now - CREDIT) + self.time(frame, limit)).min(now + LONGEST_WAIT);
     }
 
     fn on_request(&mut self, frame: &Frame, now: Mono) {

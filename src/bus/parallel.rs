@@ -173,8 +173,7 @@ impl Pace {
     /// A frame was sent. Its answer is assumed to have the same length.
     fn on_sent(&mut self, frame: &Frame, now: Mono) {
         let Some(bit_rate) = self.bit_rate else { return };
-        let earliest = Mono::at(now.since_start().saturating_sub(QUEUED));
-        self.ready_at = self.ready_at.max(earliest) + (2 * frame_time(frame, bit_rate)).div_f64(OWN_LOAD);
+        self.ready_at = self.ready_at.max(now - QUEUED) + (2 * frame_time(frame, bit_rate)).div_f64(OWN_LOAD);
     }
 }
 

@@ -4,7 +4,7 @@
 use crate::program::{Devices, cangauge, command, setting, shown, without_the_right};
 use crate::{assert_nothing_more, frame, next, next_frame, run};
 use cangauge::bus::socketcan::SocketCan;
-use cangauge::bus::{BitRateControl, Bus, BusError, Mode};
+use cangauge::bus::{BitRateControl, Bus, BusError, Event, Mode};
 use serde_json::{Value, json};
 use std::process::Stdio;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -95,6 +95,26 @@ fn without_the_privilege_the_commands_to_type_are_printed() {
     let refused = "cangauge: no permission to set the bit rate of can0\nhint: by hand: sudo cangauge bus detect can0\n";
     done.is(5, "", refused);
     assert_eq!(setting("can0"), before);
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn many_requests_stay_below_the_bus_load_of_the_option() {
+    let _alone = controllers();
+    ip("can0 up");
+    let mut other = SocketCan::open("can1").unwrap();
+    let done = cangauge("--bus can0 --retries 0 scan --max-load 10%");
+    assert_eq!((done.code, done.stdout.as_str()), (Some(3), ""), "{}", done.stderr);
+    let mut times = Vec::new();
+    for _ in 0..127 {
+        let Event::Frame(received) = next(&mut other) else { panic!("only {} requests", times.len()) };
+        times.push(received.at.mono);
+    }
+    assert_nothing_more(&mut other);
+    // The first 16 requests are sent at once. A request of 8 bytes has about 110 bits.
+    let took = times[126].since(times[15]);
+    let busy = Duration::from_micros(111 * 110 * 8);
+    assert!(took > busy.mul_f64(9.0), "{took:?} for frames of {busy:?}");
 }
 
 #[test]
