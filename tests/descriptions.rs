@@ -25,10 +25,10 @@ const NO_OBJECT: u32 = 0x0602_0000;
 const NO_SUB_INDEX: u32 = 0x0609_0011;
 const GENERAL: u32 = 0x0800_0000;
 
-/// Objects outside of CiA 404 whose values move.
+/// Objects outside of CiA 404 whose values change.
 const MEASURED: [&str; 4] = ["minimum-pv", "maximum-pv", "process-value-integer", "rest-lifetime"];
 
-/// Incomplete descriptions: they cover one procedure only and say so.
+/// Incomplete descriptions. A comment at the top of each file states this.
 const INCOMPLETE: [&str; 6] = ["hydac-old", "baumer", "danfoss-p92c", "epson-a552", "epson-g552", "hydronautics"];
 
 fn complete() -> impl Iterator<Item = &'static Arc<Model>> {

@@ -693,7 +693,8 @@ fn every_name_in_every_file_can_be_typed() {
                 && name.chars().count() <= 241
         };
         for (object, name) in names_in(text.trim_start_matches('\u{feff}')).into_iter().filter(named) {
-            // A name that objects share gives their full names. The name of a record or array means its sub-objects.
+            // For a name that several objects share, the dictionary returns their full names. The name of a record or
+            // array means its sub-objects.
             let mut named = [vec![name.clone()], eds.dictionary.namesakes(&name)].concat().into_iter();
             let is_found =
                 named.any(|name| eds.dictionary.find(&name).is_some_and(|it| it.object.index == object.index));

@@ -199,7 +199,7 @@ fn man_pages_are_up_to_date() {
     check("man", &pages);
 }
 
-/// The names in the error of an unknown key are all keys that the parser knows.
+/// The error for an unknown key lists all keys that the parser knows.
 #[test]
 fn every_key_of_a_bench_file_has_an_entry_in_its_page() {
     let page = &hand_written()["cangauge-bench.5"];
@@ -231,7 +231,7 @@ fn the_example_of_the_bench_page_is_a_bench() {
     }
 }
 
-/// The names in the mistake about an unknown key are all keys that the parser knows.
+/// The mistake about an unknown key lists all keys that the parser knows.
 #[test]
 fn every_key_of_a_description_has_an_entry_in_its_page() {
     let page = &hand_written()["cangauge-device.5"];

@@ -123,7 +123,7 @@ const FUNCTION_LINES: usize = 60;
 const LONG: &[(&str, &str, usize)] =
     &[("canopen/value.rs", "encode_text", 65), ("sim/sdo_server/tests.rs", "block_download", 62)];
 
-/// Every place that breaks rule 9 of the design, or writes text outside `output`.
+/// Every line that violates one of the four rules below (CONTRIBUTING.md, Rules).
 fn second_places(source: &Source) -> Vec<(&'static str, usize)> {
     let mut found = Vec::new();
     let is_in = |layers: &[&str]| layers.contains(&source.layer());
@@ -200,7 +200,7 @@ fn forbidden_means(source: &Source) -> Vec<String> {
     found
 }
 
-/// Rule 7 of the design: outside `device`, `sim` and the command line no code depends on the name of a device.
+/// Outside `device`, `sim` and the command line no code depends on the name of a device (CONTRIBUTING.md, Rules).
 fn device_names<'a>(sources: impl Iterator<Item = &'a Source>) -> Vec<String> {
     let names: Vec<String> = fs::read_dir(folder().join("device/devices"))
         .expect("the descriptions")

@@ -1,7 +1,7 @@
 """A small CANopen device on a raw SocketCAN socket. Needs nothing but the standard library.
 
-The device has no faults: a CiA 404 transmitter with one channel of 1.25 bar, whose TPDO1 follows every SYNC. A scene is
-a subclass that overrides one method.
+The device has no faults: a CiA 404 transmitter with one channel of 1.25 bar, whose TPDO1 follows every SYNC. A
+scene (see table.py) is a subclass that overrides one method.
 """
 
 import select
@@ -65,7 +65,7 @@ class Device:
         self.change()
 
     def change(self):
-        """Changes the objects for the scene."""
+        """Changes the objects, in a scene."""
 
     def array(self, index, *values):
         """Sets an object with sub-indices from 1."""

@@ -255,7 +255,7 @@ fn junit_reports() {
     assert!(report.contains("<testcase classname=\"cangauge.node-5\" name=\"pressure &lt; 1 bar\""), "{report}");
     assert!(report.contains("message=\"1.25 bar\">pressure &lt; 1 bar: 1.25 bar</failure>"), "{report}");
     assert_eq!(report.matches("<testcase ").count(), 2);
-    // An existing report is replaced, but not without a result.
+    // An existing report is replaced only if there is a result.
     fs::write(bench.path("report.xml"), "old").expect("written");
     check(&bench, &["5", "presure < 1", "--junit", "report.xml"]).exit(2);
     assert_eq!(bench.text("report.xml"), "old");
@@ -290,7 +290,7 @@ fn github_annotations_and_step_summary() {
     let row =
         "| **FAIL** | 5 | pressure &#60; 1 bar | 1.25 bar |\n| ok | 5 | temperature &#62; 20 degC | 25.5 degC |\n";
     assert!(bench.text("summary.md").contains(row), "{}", bench.text("summary.md"));
-    // Without an answer, too; the table of another step stays.
+    // Also without an answer. The table of an earlier step is kept.
     let silent = ["check", "9", "pressure < 1 bar", "--annotate", "github"];
     let done = run(&silent, &[("GITHUB_STEP_SUMMARY", "summary.md")]).exit(3);
     assert!(
@@ -379,7 +379,7 @@ fn a_replayed_recording_is_checked_completely() {
     );
     assert_eq!(done.stdout.lines().count(), 4);
     replay(&["all", "pressure < 2 bar"]).exit(1);
-    // A named node that is not in the recording is no success.
+    // A named node that is not in the recording is an error.
     let done = replay(&["5,9", "pressure < 2 bar"]).exit(7);
     assert!(
         done.stdout.contains("none  9  pressure < 2 bar  no data: node 9 sent none of its signals\n"),

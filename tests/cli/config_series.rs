@@ -26,7 +26,8 @@ fn sixteen_devices_take_little_more_than_the_time_of_their_frames() {
         done.frames.iter().map(|frame| frame_time(&frame.parse::<Frame>().expect("a frame"), 250_000)).sum();
     let took = Duration::from_micros(done.times.last().expect("frames") - done.times[0]);
     assert!(took < needed.mul_f64(1.2), "{took:?} for frames of {needed:?}");
-    // Never two requests on one node before the answer. Their heartbeats delay no answer beyond the time-out.
+    // A node never gets a second request before its answer to the first. Heartbeats do not delay an answer beyond the
+    // time-out.
     for node in 1..=16 {
         let (request, answer) = (format!("6{node:02X}#"), format!("5{:02X}#", 0x80 + node));
         let own = done.frames.iter().filter(|frame| frame.starts_with(&request) || frame.starts_with(&answer));

@@ -221,7 +221,7 @@ fn an_expression_uses_the_names_of_an_eds() {
     assert!(done.stderr.contains("read 0x2200:0"), "{}", done.stderr);
     let done = run(&["check", "1", "ofset < 5"]).exit(2);
     assert!(done.stderr.contains("no signal \"ofset\""), "{}", done.stderr);
-    // The description has names, too.
+    // The description also has names.
     bench.run_words(&["check", "1", "pressure < 100 bar and producer-heartbeat-time == 0"]).exit(0);
 }
 
@@ -356,7 +356,7 @@ fn completion_offers_commands_options_and_values() {
         let found: Vec<&str> = found.iter().filter_map(|found| found.split('\t').next()).collect();
         names.iter().for_each(|name| assert!(found.contains(name), "{line} {name}: {found:?}"));
     };
-    // The value of an option is no command.
+    // The value of an option is not a command.
     offers("-b sim re", &["read", "restore"]);
     offers("-b sim:mh4@5 log 5 --sy", &["--sync"]);
     offers("log 5 --ex", &["--expect"]);

@@ -286,7 +286,7 @@ fn only_requested_signals_are_recorded() {
     assert_eq!(ch5, wanted[..10]);
     let both = rows_of("log 5 ch16 ch1 --count 10");
     assert_eq!(count(&both).into_keys().collect::<Vec<_>>(), [("5", "ch1"), ("5", "ch16")]);
-    // The status has rows of its own only if it is requested.
+    // The status has separate rows only if it is requested.
     let bench = one("mh4", "");
     let status = rows(&bench.run("log 5 pressure pressure.status --sync 10ms --count 4").exit(0).stdout);
     let found: Vec<_> = status.iter().map(|row| (row.signal.as_str(), row.status(), row.rest[3].len())).collect();

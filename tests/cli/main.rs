@@ -229,7 +229,7 @@ impl Bench {
     }
 }
 
-/// Where the virtual clock starts: 2026-01-01 00:00 UTC.
+/// The start of the virtual clock: 2026-01-01 00:00 UTC.
 const EPOCH_S: u64 = 1_767_225_600;
 
 /// `1767225600.018668` as microseconds since the virtual clock's start; times of the real clock are larger.

@@ -384,7 +384,7 @@ fn recordings_without_usable_times_are_refused_with_the_reason() {
         assert!(done.stderr.contains("t.log:1: the times do not increase"), "{}", done.stderr);
         assert_eq!(done.stdout, "");
     }
-    // Times that count from the start of the recording are times.
+    // Times since the start of the recording are accepted.
     let done = log_of(&bench, recording(|_, ms, id, data| format!("(0.{ms:03}000) can0 {id}#{data}\n"))).exit(0);
     assert_eq!(done.stdout.lines().count(), 6, "{}", done.stdout);
     assert!(done.stderr.contains("the times have no date"), "{}", done.stderr);

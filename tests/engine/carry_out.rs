@@ -299,7 +299,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             }
             let document = Document::parse(&text).expect("TOML");
             let before = config::read(master, node(*id), &none, Some(&config::File::Settings(document.clone())))?;
-            // Mistakes: what this device does not have.
+            // The file may contain settings that this device does not have.
             let Ok(file) = before.check(&document) else { return Ok(Claim::Nothing) };
             config::apply(master, before, &file, &config::Options::default(), &none, &mut Unkept)?;
             Claim::Configured(wanted)

@@ -38,7 +38,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// The number of scenarios of a plain `cargo test`.
 const FIXED: u64 = 400;
 
-/// After so many failures the test stops.
+/// The test stops after this number of failures.
 const MOST: usize = 12;
 
 fn env_number<T: std::str::FromStr>(name: &str) -> Option<T> {
@@ -46,7 +46,7 @@ fn env_number<T: std::str::FromStr>(name: &str) -> Option<T> {
     Some(text.parse().unwrap_or_else(|_| panic!("{name}={text} is not a number")))
 }
 
-/// Prints a line. A closed stdout is no error.
+/// Prints a line. A closed stdout is not an error.
 fn print_line(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }

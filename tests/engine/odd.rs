@@ -31,7 +31,7 @@ pub(crate) enum Oddity {
     Pdo(usize),
     /// It has neither a profile nor a known vendor. The types of its objects are then unknown.
     Unidentified,
-    /// TPDO1 contains its pressure as INTEGER16 with so many digits that it is clipped.
+    /// TPDO1 contains its pressure as INTEGER16 with too many decimal digits: the value is clipped.
     Clips,
     /// Another device has the same node-ID.
     DuplicateId,
@@ -145,8 +145,7 @@ impl Oddity {
             && is_tpdo(frame)
     }
 
-    /// The NMT command that the device behaves as if it received when it is operational, and the emergency it sends
-    /// then.
+    /// The NMT command that the device executes by itself when it becomes operational, and its emergency.
     pub(crate) fn own_command(self, node: NodeId) -> Option<(Frame, Option<Frame>)> {
         let specifier = match self {
             Oddity::NoTpdo(TpdoFault::LeavesOperational | TpdoFault::Emergency) => NmtCommand::EnterPreOperational,

@@ -384,7 +384,7 @@ impl Station for Babbler {
         let (id, least) = match random.within(0..=7) {
             _ if !self.nasty => (*random.pick(&[0x7ff, 0x010, 0x7f0, 0x679]), 0),
             0 => (0x080 + node, 8),
-            // A frame that looks like an acknowledge would be one.
+            // The program would accept a frame that looks like an acknowledgement, so its first byte is changed below.
             1..=3 => (0x580 + node, 0),
             4 => (0x700 + node, 0),
             5 => (0x7e4, 0),

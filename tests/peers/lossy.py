@@ -126,7 +126,7 @@ class Worker(threading.Thread):
             else:
                 complaints.append(f"false: {false}")
         elif done.returncode == 2 and "no valid answer" in done.stderr:
-            pass  # Without the device type (1000h), the types of the signals are unknown. The note names it.
+            pass  # Without the device type (1000h), the types of the signals are unknown. The note on stderr names 1000h.
         elif done.returncode not in FAILURES | {0} or "panicked" in done.stderr:
             complaints.append("not a failure of the wire")
         # A delayed frame would disturb the next command.
@@ -396,7 +396,7 @@ def main():
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--percent", type=float, default=4)
     parser.add_argument("--only-loss", action="store_true")
-    parser.add_argument("--verbose", action="store_true", help="print the failures, too")
+    parser.add_argument("--verbose", action="store_true", help="also print the failures")
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(1 << 32))
     parser.add_argument("binary")
     parser.add_argument("here")

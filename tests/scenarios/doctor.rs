@@ -1,4 +1,4 @@
-//! `doctor` names the cause of prepared faults, and nothing else. It names none if all is well.
+//! `doctor` reports the cause of prepared faults, and nothing else. Without a fault, it reports nothing.
 
 use super::log_goes_on::Other;
 use cangauge::bus::Mono;

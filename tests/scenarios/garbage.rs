@@ -17,7 +17,8 @@ const BENCH: &str = "clock = \"virtual\"\nbit_rate = 1000000\nseed = 3\nrecord =
     [[device]]\nkind = \"mh4\"\nnode = 1\n[[device]]\nkind = \"d20\"\nnode = 2\n\
     [[device]]\nkind = \"mc1609\"\nnode = 3\n[[device]]\nkind = \"dps\"\nnode = 127\n";
 
-/// The TPDOs that the devices send, with their lengths: these frames would be measurements.
+/// The TPDOs that the devices send, with their lengths. Such frames are not sent as garbage, because they are valid
+/// measurements.
 const TPDOS: [(u16, usize); 8] =
     [(0x181, 5), (0x281, 5), (0x182, 4), (0x183, 8), (0x283, 8), (0x383, 8), (0x483, 8), (0x1ff, 4)];
 
@@ -41,7 +42,7 @@ impl GarbageSender {
             for low in (0..=16).chain([0x40, 0x7e, 0x7f]) {
                 let id = function << 7 | low;
                 for length in 0..=8usize {
-                    // 03h is no NMT command, 00h in a heartbeat is a boot-up, E0h is no SDO command.
+                    // 03h is not an NMT command, 00h in a heartbeat is a boot-up, E0h is not an SDO command.
                     let data = [[0x03, 0xe0, 0xff, 0x7e][usize::from(low % 4)]; 8];
                     let harmless = match function {
                         0 => low == 0 && data[0] == 0x03,

@@ -217,7 +217,8 @@ fn lost_return_to_the_previous_state_is_noticed() {
     assert_eq!((commands, is_reported), (["000#0105"].map(str::to_owned).to_vec(), true));
 }
 
-/// After a restart, the answers with the vendor are lost until 4 s: the device is not taken for another one.
+/// After a restart, the answers with the vendor are lost until 4 s: the program does not report another
+/// device.
 #[test]
 fn restarted_node_is_read_again_until_it_answers_completely() {
     let text = format!("clock = \"virtual\"\n{DPS}");

@@ -134,7 +134,7 @@ fn shorter_than_announced_is_accepted_if_read_twice_alike() {
     assert_eq!(value(&answer, Some(DataType::VisibleString)), Ok(expected));
     // A number with missing bytes has no value.
     assert!(value(&answer, Some(DataType::Unsigned(4))).is_err());
-    // A file never gets them.
+    // A value that is shorter than announced is never written to a file.
     let error = read(&steps, Request::read(node(), NAME).exact(true)).expect_err("3 of 100 bytes");
     let frame = ABC[0].parse().expect("a frame");
     assert_eq!(error.failure, SdoFailure::WrongLength { announced: Some(100), delivered: 3, frame });

@@ -356,8 +356,8 @@ fn check(case: &Case, start: bool, fault: Fault, at: usize, old: &Snapshot, well
 /// A TPDO that moves to another identifier.
 const MOVED: Case = Case { cob_id: Some(0x3a5), ..CASES[4] };
 
-/// Runs each case with each fault at each write and NMT command. Reads are tested at each frame in one run; the other
-/// runs read in the same way, and each tests another eighth of them.
+/// Runs each case with each fault at each write and NMT command. One run also has each fault at each read. The other
+/// runs read the same objects, so each of them tests only one eighth of the reads.
 fn at_each_frame(faults: &[Fault]) {
     for (number, case) in CASES.iter().chain([&MOVED]).enumerate() {
         let starts: &[bool] = if number < 2 { &[false, true] } else { &[true] };

@@ -52,7 +52,7 @@ fn ctrl_c_at_any_time_restores_the_heartbeat() {
     assert_eq!(after_probe_with(10_000, &[]), (10_000u16.to_le_bytes().to_vec(), false));
 }
 
-/// A journal that outlives its program, with the number of frames that were sent before each record.
+/// A journal that is kept after its program has ended, with the number of frames that were sent before each record.
 #[derive(Default)]
 pub(super) struct Kept(pub(super) Vec<TemporaryWrite>);
 

@@ -205,7 +205,7 @@ fn reported_zero_matches_the_device() {
             let holds = bus.look(offset);
             match result {
                 Ok(report) => {
-                    // A restart after the last answer comes after the report.
+                    // If the device restarts after the last answer, the command has already reported its result.
                     assert!(holds == new || fault == Fault::Restart && last, "{place}");
                     assert!(report.after.expect("measured").abs() <= 0.001 && !report.stored, "{place}");
                     assert_ne!(fault, Fault::Interrupt, "{place}");
@@ -287,7 +287,8 @@ fn settings_reported_as_stored_survive_a_reset() {
                 Ok(done) => {
                     assert_eq!(done.verified, if verify { Verified::Reset } else { Verified::Ack });
                     bus.reset();
-                    // A restart before the store loses the setting. The check proves only values read before it.
+                    // A restart before the store loses the setting. Only a value that was read before
+                    // the restart is proven.
                     let read = bus.sent.iter().position(|sent| sent.ends_with("#4032610100000000"));
                     let proven = read.is_some_and(|read| read < at);
                     let restarts = matches!(fault, Fault::Restart | Fault::Restarted) && !proven;

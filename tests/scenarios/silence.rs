@@ -428,7 +428,7 @@ fn device_that_was_replaced_is_an_event_and_a_failure() {
         ("605#2318100402000000", "it is another device: serial 2, before 1"),
         ("605#2318100263000000", "it is another device"),
     ] {
-        // The wrong length makes the node read again.
+        // After the wrong length, the program reads the node again.
         let case = Case { seconds: Some(6), ..Case::of(inputs) }.hears(&[(2000, write), (2500, "185#0102030405")]);
         let (result, kept) = case.run();
         let report = result.expect("a recording");

@@ -169,7 +169,8 @@ fn frames_received_before_ctrl_c_are_recorded() {
     assert!(bus.inner.now().mono < Mono::at(Duration::from_millis(1700)), "the recording ends without waiting");
 }
 
-/// All rows may have been received before the recording starts. Its last row is its end, so no node is lost.
+/// All rows may have been received before the recording starts. The recording ends with its last row, so no
+/// node is reported as lost.
 #[test]
 fn recording_with_a_count_ends_with_its_last_row() {
     let text = "clock = \"virtual\"\n[[device]]\nkind = \"dps\"\nnode = 5\nstart = true\n";

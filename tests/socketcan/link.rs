@@ -137,7 +137,7 @@ fn a_signal_ends_a_wait_once() {
     raise().unwrap();
     assert_eq!(next(&mut bus), Event::Interrupted);
     assert_nothing_more(&mut bus);
-    // Another bus of the same process gets both signals, too.
+    // Another bus of the same process also gets both signals.
     assert_eq!(next(&mut other), Event::Interrupted);
     assert_eq!(next(&mut other), Event::Interrupted);
     assert_eq!(next_frame(&mut other), "000#8000");

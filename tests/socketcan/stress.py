@@ -39,7 +39,7 @@ class Stress:
         self.counts, self.failures = collections.Counter(), []
 
     def start(self):
-        """The present start time of several commands on this machine."""
+        """How long several commands need at present to start on this machine."""
         started = time.monotonic()
         subprocess.run([self.binary, "devices"], stdout=subprocess.DEVNULL, check=True)
         return 10 * (time.monotonic() - started)
@@ -49,7 +49,7 @@ class Stress:
                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
     def end(self, process, limit, *exits):
-        """Waits for the end of a command, not longer than `limit` seconds, one more, and the time of a start."""
+        """Waits for the end of a command, at most `limit` + 1 seconds plus the start-up time."""
         for seconds in (limit + 1, 0):  # The machine may have become slow: measure again.
             with contextlib.suppress(subprocess.TimeoutExpired):
                 out, err = process.communicate(timeout=seconds + self.start())
@@ -94,7 +94,7 @@ class Stress:
             time.sleep(self.rng.uniform(0, 1))
             process.send_signal(signal.SIGCONT)
         process.send_signal(sent)
-        # Before the program handles signals they end it: a negative code.
+        # A signal that arrives before the program handles signals ends the program. The exit code is then negative.
         self.end(process, 0, *((-sent,) if sent == signal.SIGKILL else (-sent, 0, 3, 130)))
         rows, is_whole = rows_of(path)
         assert is_whole or sent == signal.SIGKILL, f"{path}: the last line is cut off"
@@ -239,7 +239,7 @@ def rows_of(path):
 def main():
     (binary, interface), seed = sys.argv[1:3], int(os.environ.get("STRESS_SEED", random.randrange(10**9)))
     print(f"seed {seed}", flush=True)
-    # In memory: the disk of the guest does not know that two hard links are one file.
+    # In memory: on the file system of the guest, two hard links look like two files.
     with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
         stress = Stress(binary, interface, folder, random.Random(seed))
         with open(os.path.join(folder, "bench.toml"), "w", encoding="ascii") as file:

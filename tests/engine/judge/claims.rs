@@ -63,7 +63,8 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Claim, after: &[DeviceSt
                 if stops && fails {
                     continue;
                 }
-                // On a disturbed bus the command arrives late: a heartbeat from before it is then received after it.
+                // On a disturbed bus the node may receive the command late. Then a heartbeat with the old state is
+                // received after the command was sent.
                 let late = spec.loses_sent() || spec.devices.iter().any(|device| device.bit_rate.is_some());
                 if late && matches!(command, Command::Nmt { what, .. } if what.target() != *state) {
                     continue;

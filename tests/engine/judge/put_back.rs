@@ -20,7 +20,7 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violat
     if cannot || run.bus.overran || run.killed.is_some() {
         return;
     }
-    // The interface has its bit rate from before.
+    // The interface has its previous bit rate again.
     if detects && run.bus.bit_rate() != Some(BIT_RATE) && !run.bus.was_down {
         violations.push(("restores the interface", format!("{:?}", run.bus.bit_rate())));
     }
@@ -32,7 +32,7 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violat
     if spec.is_changed_by_others() || spec.falsifies_data() || spec.is_disordered() || spec.shares_node_ids() {
         return;
     }
-    // The NMT state that heartbeats showed before is back.
+    // The NMT state is the same as in the heartbeats before the command.
     let clean_answers = spec.faults.is_empty()
         && spec.device_faults().all(|device_fault| matches!(device_fault, DeviceFault::Refuse { .. }));
     let keeps = match &spec.command {

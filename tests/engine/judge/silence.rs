@@ -20,7 +20,7 @@ pub(super) fn check_cause(spec: &Spec, run: &Run, violations: &mut Vec<Violation
         _ => {}
     }
     let stopped = failure.kind() == Kind::CheckFailed && !matches!(spec.command, Command::Check { .. });
-    // A setting that was written and restored is no change; the check after a power cycle shows the rest.
+    // A setting that was written and restored is not a change. The check after a power cycle shows other changes.
     let undoes = matches!(spec.command, Command::Assign { .. });
     if undoes {
         return;
@@ -93,7 +93,7 @@ fn was_silent(spec: &Spec, run: &Run, failure: &Failure, violations: &mut Vec<Vi
         return;
     };
     // Before an object is read again, another one is read, so that a late answer cannot count as the new one. The
-    // read without an answer may be that one.
+    // read without an answer may be this other read.
     let answered = requests[first..].iter().all(|(at, (object, _))| {
         let until = *at + Duration::from_millis(spec.timeout_ms);
         let mut received = run.bus.frames.iter();

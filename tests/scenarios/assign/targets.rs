@@ -180,7 +180,7 @@ fn two_devices_with_one_node_id() {
     assert!(done.failure().1.contains("several devices probably have this node-ID"), "{}", done.failure().1);
     assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("VENDOR:PRODUCT:REVISION:SERIAL"));
     assert_eq!(all_snapshots(&bus), before);
-    // One of them is addressed by its identity. It is not reset, so that is no success yet.
+    // One of them is addressed by its identity. It is not reset, so this is not a success yet.
     let done = run(&mut bus, "0x362:0x443150:0x10000:200", &id(12));
     assert_eq!(done.failure().0, Kind::Unexpected);
     assert!(done.failure().1.contains("not reset") && done.failure().1.contains("stored"), "{}", done.failure().1);
