@@ -147,7 +147,7 @@ impl Report for VerdictRow<'_> {
         Column::new("values").json_only(),
         Column::new("first").json_only(),
         Column::new("reason").json_only(),
-        Column::new("findings").csv_only(),
+        Column::new("findings"),
     ];
 
     fn cells(&self) -> Vec<Cell> {

@@ -232,7 +232,7 @@ fn json_and_csv() {
         rows[0],
         json!({"expression": "pressure < 2 bar", "node": 5, "verdict": "ok", "count": 1, "violations": 0, "invalid": 0,
             "values": [{"quantity": "pressure", "value": 1.25, "unit": "bar", "min": null, "max": null}],
-            "first": null, "reason": null})
+            "first": null, "reason": null, "findings": "1.25 bar"})
     );
     assert_eq!((&rows[1]["verdict"], &rows[1]["violations"]), (&json!("fail"), &json!(1)));
     assert_eq!(
