@@ -118,7 +118,10 @@ fn every_built_in_device_is_listed() {
 #[cfg(unix)]
 fn the_python_example_works() {
     let [example] = blocks("python").try_into().expect("one example");
-    let done = match Command::new("python3").env("PATH", search_path()).args(["-c", &example]).output() {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/python");
+    let mut python = Command::new("python3");
+    python.env("CANGAUGE", env!("CARGO_BIN_EXE_cangauge")).env("PYTHONPATH", package).args(["-B", "-c", &example]);
+    let done = match python.output() {
         Err(error) if error.kind() == IoError::NotFound => {
             return writeln!(std::io::stderr(), "SKIPPED: there is no python3").expect("stderr");
         }
