@@ -126,7 +126,7 @@ class Worker(threading.Thread):
             else:
                 complaints.append(f"false: {false}")
         elif done.returncode == 2 and "no valid answer" in done.stderr:
-            pass  # Without the device type (1000h), the types of the signals are unknown. The note on stderr names 1000h.
+            pass  # Without the device type (1000h), the types of the signals are unknown. The note names 1000h.
         elif done.returncode not in FAILURES | {0} or "panicked" in done.stderr:
             complaints.append("not a failure of the wire")
         # A delayed frame would disturb the next command.

@@ -170,10 +170,8 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::NotReadAgain(node) => format!("node {node} could not be read again: its later frames were ignored"),
         Remark::LeftOperational(nodes) => left_operational(nodes),
         Remark::NotStarted(nodes) => {
-            format!(
-                "not started, because log starts only sensors: node {}; start all nodes: log --start",
-                listed(nodes)
-            )
+            let nodes = listed(nodes);
+            format!("not started, because log starts only sensors: node {nodes}; start all nodes: log --start")
         }
         Remark::OtherNmtMaster(nodes, command, target) => format!(
             "not started, because another NMT master sent \"{}\" to {}: node {}; start all nodes: log --start",
