@@ -1,8 +1,7 @@
 //! `cangauge info`.
 
-use super::Global;
-use super::nodes::on_node;
 use super::scan::Scan;
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::info::read;
@@ -35,6 +34,7 @@ impl Info {
         if self.passive {
             return Scan::passive(self.node).run(global);
         }
-        global.print(&[on_node(global, self.node, |master, node| read(master, node))?])
+        let overrides = descriptions::overrides(global, &[self.node])?;
+        global.print(&[global.with_master(|master| Ok(read(master, self.node, &overrides)?))?])
     }
 }

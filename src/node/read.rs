@@ -27,13 +27,15 @@ pub fn read_values<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Result<
 const MAX_SILENT: u32 = 8;
 
 /// Reads objects that a device may not have, or may not answer. An object without a valid answer does not affect the
-/// others.
+/// others. The answers of optional objects are kept: each of them is read once.
 pub struct Reader<'a, A> {
     pub(super) master: &'a mut A,
     /// An object that each node answered. Not 1000h, because some devices answer only this object.
     answered: BTreeMap<NodeId, ObjectId>,
     /// The errors of nodes that do not answer any more, or whose answers come from two devices.
     failed: BTreeMap<NodeId, SdoError>,
+    /// The answers of optional objects. A rejected read is also an answer.
+    known: BTreeMap<(NodeId, ObjectId), Result<Answer, SdoError>>,
 }
 
 /// For each node: the first error, and the number of consecutive objects without an answer.
@@ -42,7 +44,7 @@ type Silences = BTreeMap<NodeId, (SdoError, u32)>;
 impl<'a, A: Ask> Reader<'a, A> {
     /// A reader that has read nothing.
     pub fn new(master: &'a mut A) -> Reader<'a, A> {
-        Reader { master, answered: BTreeMap::new(), failed: BTreeMap::new() }
+        Reader { master, answered: BTreeMap::new(), failed: BTreeMap::new(), known: BTreeMap::new() }
     }
 
     /// Reads objects. One result for each, in their order.
@@ -135,21 +137,31 @@ impl<'a, A: Ask> Reader<'a, A> {
         Ok(self.read_optional(objects)?.into_iter().map(Result::ok).collect())
     }
 
-    /// Reads optional objects. Those without a valid answer are recorded as unknown.
+    /// Reads optional objects that this reader has not read before. Those without a valid answer are recorded as
+    /// unknown.
     ///
     /// # Errors
     /// A node does not answer any more; failures of the bus, and Ctrl-C.
     pub fn read_optional(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, A::Stop> {
-        let results = self.read(objects)?;
+        let unread: Vec<_> = objects.iter().filter(|object| !self.known.contains_key(object)).copied().collect();
+        let mut results = self.read(&unread)?.into_iter();
         if let Some(error) = self.failed.values().next() {
             return Err(Error::Sdo(error.clone()).into());
         }
+        let results: Vec<Result<Answer, SdoError>> =
+            objects.iter().filter_map(|object| self.known.get(object).cloned().or_else(|| results.next())).collect();
         for error in results.iter().filter_map(|result| result.as_ref().err()) {
             let is_answered = matches!(error.failure, SdoFailure::Refused(_) | SdoFailure::Fit(_));
             if !is_answered && !matches!(error.failure, SdoFailure::Cancelled | SdoFailure::TwoDevices(Some(_))) {
                 self.master.add_unknown(error.node, error.object);
             }
         }
+        let is_answer = |result: &Result<Answer, SdoError>| match result {
+            Ok(_) => true,
+            Err(error) => matches!(error.failure, SdoFailure::Refused(_)),
+        };
+        let answered = objects.iter().zip(&results).filter(|(_, result)| is_answer(result));
+        self.known.extend(answered.map(|(&object, result)| (object, result.clone())));
         Ok(results)
     }
 

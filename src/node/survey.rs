@@ -144,14 +144,25 @@ pub fn revisions(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<N
 /// # Errors
 /// A node does not answer, or the survey cannot continue.
 pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
-    let mut reader = Reader::new(master);
-    let mut found = identify_with(&mut reader, nodes, overrides)?;
-    read_services(&mut reader, &mut found)?;
-    read_tpdos(&mut reader, &mut found)?;
-    find_signals(&mut reader, &mut found)?;
-    read_units(&mut reader, &mut found)?;
-    ranges::read_ranges(&mut reader, &mut found)?;
-    ranges::read_overloads(&mut reader, &mut found)?;
+    survey_with(&mut Reader::new(master), nodes, overrides)
+}
+
+/// Like [`survey_nodes`], with a reader that keeps the answers for further reads.
+///
+/// # Errors
+/// As [`survey_nodes`].
+pub fn survey_with<A: Ask>(
+    reader: &mut Reader<'_, A>,
+    nodes: &[NodeId],
+    overrides: &Overrides,
+) -> Result<Vec<Node>, A::Stop> {
+    let mut found = identify_with(reader, nodes, overrides)?;
+    read_services(reader, &mut found)?;
+    read_tpdos(reader, &mut found)?;
+    find_signals(reader, &mut found)?;
+    read_units(reader, &mut found)?;
+    ranges::read_ranges(reader, &mut found)?;
+    ranges::read_overloads(reader, &mut found)?;
     Ok(found)
 }
 

@@ -140,6 +140,16 @@ fn settings_of_many_channels_are_grouped_by_value() {
 }
 
 #[test]
+fn each_object_is_read_once() {
+    let done = Bench::of("mc1609@3").run("info 3").exit(0);
+    let mut reads: Vec<&str> = done.frames_of("603").into_iter().filter(|data| data.starts_with("40")).collect();
+    let count = reads.len();
+    reads.sort_unstable();
+    reads.dedup();
+    assert_eq!(reads.len(), count);
+}
+
+#[test]
 fn node_guarding_is_shown_as_monitoring() {
     let bench = Bench::described("[[device]]\nkind = \"d20\"\nnode = 2\nset = { \"0x100C\" = 100, \"0x100D\" = 3 }\n");
     let page = bench.run("info 2 -f json").exit(0).json().remove(0);

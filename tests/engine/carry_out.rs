@@ -161,8 +161,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             Claim::Values(values)
         }
         Command::Info { node: id } => {
-            let device = settings::open(master, node(*id), &none)?;
-            let read = info::read(master, &device)?;
+            let read = info::read(master, node(*id), &none)?;
             Claim::Found(vec![(*id, read.node.identity.serial)])
         }
         Command::PdoShow { node: id } => {

@@ -372,14 +372,14 @@ fn pages_show_the_objects_that_answer() {
             let errors = settings::errors::read(master, &device).expect("the other object answers");
             assert_eq!((errors.register, errors.count.is_some()), (register, silent == 0x1001));
             assert_eq!(master.unknown_objects()[&node()], [ObjectId::new(silent, 0)]);
-            assert!(settings::info::read(master, &device).is_ok());
+            assert!(settings::info::read(master, node(), &Overrides::new()).is_ok());
         });
     }
     with_mute("dps", &[0x1001, 0x1003], |master| {
         let device = settings::open(master, node(), &Overrides::new()).expect("answers");
         let failure = settings::errors::read(master, &device).expect_err("neither answers");
         assert_eq!(failure.kind(), Kind::NoAnswer);
-        let info = settings::info::read(master, &device).expect("the other objects answer");
+        let info = settings::info::read(master, node(), &Overrides::new()).expect("the other objects answer");
         assert!(info.errors.is_none() && !info.channels.is_empty());
     });
 }

@@ -3,6 +3,7 @@
 use super::errors::{Errors, read as read_errors};
 use super::limits::Limit;
 use super::{SettingsFailure, ValueWithUnit, page};
+use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
@@ -11,9 +12,9 @@ use crate::device::unit::Unit;
 use crate::master::{Master, SdoFailure};
 use crate::measure::layout::Signal;
 use crate::measure::sample::Sample;
-use crate::node::Node;
 use crate::node::read::Reader;
-use crate::node::state;
+use crate::node::survey::survey_with;
+use crate::node::{Node, Overrides, state};
 use crate::tasks::failure::Cause;
 use crate::tasks::read::{objects, sample, targets};
 use crate::tasks::{Failure, Kind};
@@ -169,7 +170,7 @@ impl Selection {
     }
 
     /// Reads the objects that the node can have. A missing answer does not affect other objects.
-    fn read(&self, master: &mut Master<'_>, node: &Node) -> Result<BTreeMap<ObjectId, Value>, Failure> {
+    fn read(&self, reader: &mut Reader<'_, Master<'_>>, node: &Node) -> Result<BTreeMap<ObjectId, Value>, Failure> {
         let all: BTreeSet<ObjectId> = [HARDWARE, SOFTWARE]
             .into_iter()
             .chain(self.communication.iter().copied())
@@ -183,18 +184,21 @@ impl Selection {
             .collect();
         let all: Vec<ObjectId> = all.into_iter().collect();
         let items: Vec<_> = all.iter().map(|&object| (node.id, object, node.data_type(object))).collect();
-        let values = Reader::new(master).values(&items)?;
+        let values = reader.values(&items)?;
         Ok(all.into_iter().zip(values).filter_map(|(object, value)| Some((object, value?))).collect())
     }
 }
 
-/// Reads the page. Objects that the device does not have or rejects are omitted.
+/// Reads the page. Objects that the device does not have or rejects are omitted. Each object is read once.
 ///
 /// # Errors
 /// No answer, protocol errors, bus errors and Ctrl-C.
-pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Info, Failure> {
+pub fn read(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Result<Info, Failure> {
+    master.listen_to(&[node])?;
+    let mut reader = Reader::new(master);
+    let node = &survey_with(&mut reader, &[node], overrides)?.pop().unwrap_or_else(|| Node::new(node));
     let selection = Selection::of(node);
-    let values = selection.read(master, node)?;
+    let values = selection.read(&mut reader, node)?;
     let samples = samples(master, node)?;
     let errors = match read_errors(master, node) {
         Ok(errors) => Some(errors),

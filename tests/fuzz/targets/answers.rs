@@ -12,7 +12,6 @@ use cangauge::output::failure::ErrorMessage;
 use cangauge::output::report::{Format, render};
 use cangauge::tasks::scan::scan;
 use cangauge::tasks::settings::info::read;
-use cangauge::tasks::settings::open;
 use cangauge_fuzz::{Bytes, node};
 use libfuzzer_sys::fuzz_target;
 use std::time::Duration;
@@ -98,7 +97,7 @@ fuzz_target!(|data: &[u8]| {
             render(&found, format, &mut text).expect("memory");
         }
     }
-    match open(&mut master, node(), &overrides).and_then(|device| read(&mut master, &device)) {
+    match read(&mut master, node(), &overrides) {
         Ok(page) => {
             for format in FORMATS {
                 render(std::slice::from_ref(&page), format, &mut text).expect("memory");
