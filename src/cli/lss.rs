@@ -14,7 +14,8 @@ use crate::output::lss::Identified;
 use crate::output::notes;
 use crate::output::progress::Activity;
 use crate::tasks::lss::{
-    Descriptions, LssCause, LssFailure, LssRange, Target, TargetError, activate, identify, inquire, scan, store,
+    Descriptions, LssCause, LssFailure, LssRange, SearchTimes, Target, TargetError, activate, identify, inquire, scan,
+    store,
 };
 use crate::tasks::{Failure, Note};
 use clap::{Args, Subcommand};
@@ -167,7 +168,8 @@ fn failed(cause: LssCause) -> anyhow::Error {
 fn run_scan(global: &Global) -> anyhow::Result<()> {
     let found = global.with_master(|master| {
         let activity = Activity::new(global.shows_progress(), "searching for devices");
-        Ok(scan(master, &mut |note| activity.above(|| print_note(global, &note)))?)
+        let times = global.timeout.map_or_else(SearchTimes::default, |timeout| SearchTimes::patient(timeout.0));
+        Ok(scan(master, times, &mut |note| activity.above(|| print_note(global, &note)))?)
     })?;
     global.print(&found)?;
     if found.is_empty() { Err(failed(LssCause::NoDevice)) } else { Ok(()) }

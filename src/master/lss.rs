@@ -186,11 +186,13 @@ impl<'bus> Lss<'_, 'bus> {
     /// # Errors
     /// No slave answers, several answer, or an answer violates the protocol.
     pub fn inquire_address(&mut self) -> Result<LssAddress, LssError> {
+        self.inquire_address_within(self.master.timing.timeout, self.master.timing.retries)
+    }
+
+    fn inquire_address_within(&mut self, timeout: Duration, retries: u32) -> Result<LssAddress, LssError> {
         let mut numbers = [0; 4];
         for (number, part) in numbers.iter_mut().zip(Part::ALL) {
-            if let Answer::Number(answer) =
-                self.one(Exchange::new(Request::Inquire(part)), self.master.timing.retries)?
-            {
+            if let Answer::Number(answer) = self.one_within(Exchange::new(Request::Inquire(part)), timeout, retries)? {
                 *number = answer;
             }
         }
@@ -274,20 +276,28 @@ impl<'bus> Lss<'_, 'bus> {
 
     /// Carries out a service that all matching slaves answer in the same way. No answer is also a valid result.
     fn ask_all(&mut self, mut exchange: Exchange) -> Result<Exchange, LssError> {
-        self.carry_out(&mut exchange, Until::Answer, self.master.timing.retries)?;
+        let timeout = self.timeout_of(&exchange);
+        self.carry_out(&mut exchange, Until::Answer, (timeout, self.master.timing.retries))?;
         Ok(exchange)
     }
 
     /// Carries out a service with one slave.
-    fn one(&mut self, mut exchange: Exchange, retries: u32) -> Result<Answer, LssError> {
-        self.carry_out(&mut exchange, Until::Answer, retries)?;
+    fn one(&mut self, exchange: Exchange, retries: u32) -> Result<Answer, LssError> {
+        let timeout = self.timeout_of(&exchange);
+        self.one_within(exchange, timeout, retries)
+    }
+
+    /// Like [`Lss::one`], with its own time-out.
+    fn one_within(&mut self, mut exchange: Exchange, timeout: Duration, retries: u32) -> Result<Answer, LssError> {
+        self.carry_out(&mut exchange, Until::Answer, (timeout, retries))?;
         exchange.one().map_err(|error| self.error(&exchange, error))
     }
 
     /// Carries out a service with all slaves in configuration state.
     fn gather<T>(&mut self, request: Request, read: impl Fn(Answer) -> Option<T>) -> Result<Gathered<T>, LssError> {
         let mut exchange = Exchange::new(request);
-        self.carry_out(&mut exchange, Until::Timeout, self.master.timing.retries)?;
+        let timeout = self.timeout_of(&exchange);
+        self.carry_out(&mut exchange, Until::Timeout, (timeout, self.master.timing.retries))?;
         let mut answers = Vec::new();
         for &(frame, answer) in exchange.answers() {
             let violation = |violation| self.error(&exchange, ExchangeError::Violation(violation, frame));
@@ -318,12 +328,16 @@ impl<'bus> Lss<'_, 'bus> {
     }
 
     /// Sends a request and waits for answers. Repeats the request if there is no answer.
-    fn carry_out(&mut self, exchange: &mut Exchange, until: Until, retries: u32) -> Result<(), LssError> {
+    fn carry_out(
+        &mut self,
+        exchange: &mut Exchange,
+        until: Until,
+        (timeout, retries): (Duration, u32),
+    ) -> Result<(), LssError> {
         // Frames received before the request do not answer it.
         self.discard_received()?;
         self.faults.clear();
         self.heard = None;
-        let timeout = self.timeout_of(exchange);
         for attempt in 0..=retries {
             // If only the answer was lost, the slave is in configuration state and ignores the address.
             if attempt > 0 && exchange.service() == Service::SwitchSelective {

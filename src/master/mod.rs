@@ -6,6 +6,7 @@
 
 mod active;
 mod foreign_traffic;
+mod heard;
 pub mod lss;
 mod machine;
 mod missed_answer;
@@ -165,14 +166,14 @@ impl<'bus> Master<'bus> {
         self.foreign_nmt
     }
 
-    /// Receives only NMT commands, and the SDO channels and the heartbeats of these nodes. On a busy bus, other frames
-    /// cost time and may fill the receive buffer.
+    /// Receives only NMT commands, LSS answers, and the SDO channels and the heartbeats of these nodes. On a busy bus,
+    /// other frames cost time and may fill the receive buffer.
     ///
     /// # Errors
     /// The bus rejects the filters.
     pub fn listen_to(&mut self, nodes: &[NodeId]) -> Result<(), Error> {
         let ids = |&node| [CanId::sdo_response(node), CanId::sdo_request(node), CanId::heartbeat(node)];
-        self.listen(&Filters::Only(nodes.iter().flat_map(ids).chain([CanId::NMT]).collect()))
+        self.listen(&Filters::Only(nodes.iter().flat_map(ids).chain([CanId::NMT, CanId::LSS_SLAVE]).collect()))
     }
 
     /// Also returns the answers to our own transfers as [`Happening::Frame`].

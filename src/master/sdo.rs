@@ -6,6 +6,7 @@ mod receive;
 
 use super::Timing;
 use super::active::Active;
+use super::heard::Heard;
 use super::missed_answer::MissedAnswers;
 use super::request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 use super::second_answer::{Answers, OnTwoDevices, SecondAnswer};
@@ -58,6 +59,7 @@ pub(super) struct SdoClient {
     can_start: bool,
     pub(super) on_two_devices: OnTwoDevices,
     pub(super) missed_answers: MissedAnswers,
+    pub(super) heard: Heard,
     /// The length of the first heartbeat of each node whose length is not one byte.
     odd_heartbeats: BTreeMap<NodeId, usize>,
 }
@@ -152,6 +154,7 @@ impl SdoClient {
             active.machine.on_sent();
             if active.asked_at.replace(active.asked_at.unwrap_or(before)).is_none() {
                 self.missed_answers.on_request(ticket.node, active.request.object);
+                self.heard.on_request(ticket.node, before);
             }
             active.unsent = active.unsent.saturating_sub(1);
             if active.unsent == 0 {
@@ -205,6 +208,7 @@ impl SdoClient {
     /// Handles a received frame; `false` if it does not belong to one of our transfers.
     pub(super) fn on_frame(&mut self, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let id = received.frame.id();
+        self.heard.on_frame(received);
         let known = id.sdo_response_node().or_else(|| id.sdo_request_node());
         let Some(number) = known.filter(|node| self.nodes.contains_key(node)) else {
             self.missed_answers.on_other_cob_id(&received.frame, received.at.mono);

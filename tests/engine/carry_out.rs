@@ -211,7 +211,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             Claim::Nothing
         }
         Command::LssScan => {
-            let found = lss::scan(master, &mut quiet)?;
+            let found = lss::scan(master, lss::SearchTimes::default(), &mut quiet)?;
             let serial = |slave: &lss::FoundSlave| slave.address.map(|address| address.serial);
             Claim::Found(found.iter().filter_map(|slave| Some((slave.node?.get(), serial(slave)))).collect())
         }

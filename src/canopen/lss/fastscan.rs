@@ -2,7 +2,7 @@
 //!
 //! Each step asks whether a slave has a number with these upper bits. An answer means yes, no answer means no. A late
 //! answer therefore gives two wrong results. So the found bits are checked after every eight bits, and before the next
-//! number. If a check fails, the eight bits are searched again with a longer time-out. If it fails again, the whole
+//! number. A check is made twice if a bit before it got no answer, which may be late. If a check fails, the eight bits are searched again with a longer time-out. If it fails again, the whole
 //! number is searched again.
 //!
 //! Several slaves may answer one step, one after the other. The second answer must not count for the next step. So
@@ -120,6 +120,8 @@ pub struct Fastscan {
     has_passed_probe: bool,
     /// The number of answers to the impossible request.
     probe_answers: u8,
+    /// Whether a bit since the last check got no answer, which may still come.
+    has_missed_answers: bool,
 }
 
 impl Fastscan {
@@ -137,6 +139,7 @@ impl Fastscan {
             extensions: 0,
             has_passed_probe: false,
             probe_answers: 0,
+            has_missed_answers: false,
         }
     }
 
@@ -149,7 +152,7 @@ impl Fastscan {
     pub fn step(&self) -> Step {
         let ask = |number, bit_check, sub, next| Request::Fastscan { number, bit_check, sub, next };
         let (request, wait) = match self.phase {
-            Phase::AllSlaves => (ask(0, Request::ALL_SLAVES, Part::Vendor, Part::Vendor), Wait::AllSlaves),
+            Phase::AllSlaves => (Request::ANY_UNCONFIGURED, Wait::AllSlaves),
             Phase::Probe => (ask(UNUSED_NUMBER, 0, Part::Product, Part::Product), Wait::Bit),
             Phase::Bit(bit) => (ask(self.number, bit, self.part, self.part), Wait::Bit),
             Phase::Check(bit) => (ask(self.number, bit, self.part, self.part), Wait::Check),
@@ -189,9 +192,12 @@ impl Fastscan {
             Phase::Bit(bit) => {
                 if !answered {
                     self.number |= 1 << bit;
+                    self.has_missed_answers = true;
                 }
                 self.phase = if bit % CHECK_EVERY == 0 { Phase::Check(bit) } else { Phase::Bit(bit - 1) };
             }
+            // A late answer to a bit may have passed the check. The next check then gets no answer.
+            Phase::Check(_) if answered && self.has_missed_answers => self.has_missed_answers = false,
             Phase::Check(bit) if answered => self.phase = bit.checked_sub(1).map_or(Phase::Advance, Phase::Bit),
             Phase::Check(bit) => return self.on_failed_check(bit),
             Phase::Advance if answered => {
@@ -222,6 +228,7 @@ impl Fastscan {
 
     /// Finds the bits from `bit` upwards again, because no slave has the bits found so far.
     fn on_failed_check(&mut self, bit: u8) -> Progress {
+        self.has_missed_answers = false;
         self.tries += 1;
         if self.tries >= TRIES {
             return self.unsettled();
@@ -304,7 +311,8 @@ mod tests {
             steps += 1;
             let answers = slaves.iter_mut().filter_map(|slave| slave.hears(step.request).then_some(())).count();
             let (now, later) = if late(step) { (0, answers) } else { (answers, 0) };
-            let progress = scan.on_end(now + std::mem::replace(&mut left_over, later));
+            let answers = now + std::mem::replace(&mut left_over, later);
+            let progress = scan.on_end(answers);
             if progress != Progress::Continue {
                 return (progress, steps);
             }
@@ -341,10 +349,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn one_is_found_in_150_steps(parts: [u32; 4]) {
+        fn one_is_found_in_150_steps_and_a_second_check_after_bits_of_1(parts: [u32; 4]) {
             let address = LssAddress::new(parts);
             let found = scan(&mut [Slave::new(address)], &mut |_| false);
-            prop_assert_eq!(found, (Progress::Found(address), 150));
+            let checked_twice = parts.iter().flat_map(|part| part.to_be_bytes()).filter(|byte| *byte != 0).count();
+            prop_assert_eq!(found, (Progress::Found(address), 150 + checked_twice));
         }
 
         #[test]

@@ -186,6 +186,10 @@ impl Request {
     /// The bit check that all slaves without a node-ID answer.
     pub const ALL_SLAVES: u8 = 0x80;
 
+    /// The fastscan request that all slaves without a node-ID answer.
+    pub const ANY_UNCONFIGURED: Request =
+        Request::Fastscan { number: 0, bit_check: Request::ALL_SLAVES, sub: Part::Vendor, next: Part::Vendor };
+
     /// The service that the frame belongs to.
     pub fn service(self) -> Service {
         match self {

@@ -2,7 +2,7 @@
 
 use super::{Lss, LssError, RETRY_PAUSE};
 use crate::bus::Mono;
-use crate::canopen::lss::{Fastscan, LssAddress, Mode, Progress, Step, Wait};
+use crate::canopen::lss::{Fastscan, LssAddress, Mode, Progress, Request, Step, Wait};
 use std::time::Duration;
 
 /// The shortest wait for an answer. Most steps of a scan take this time. After a later answer, a part of the scan is
@@ -18,34 +18,51 @@ const HOST_MARGIN: Duration = Duration::from_millis(2);
 /// The time for further slaves to answer after the first answer.
 const GATHERING_TIME: Duration = Duration::from_millis(20);
 
+/// The number of recent answers that determine the usual time.
+const RECENT_ANSWERS: usize = 16;
+
 /// The measured answer time of the slaves.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Pace {
-    /// The time of the slowest recent answer. Old answers lose their effect gradually.
-    slowest: Duration,
+    /// The times of the recent answers. The oldest one is replaced.
+    recent: [Duration; RECENT_ANSWERS],
+    /// The number of answers.
+    count: usize,
     timeout: Duration,
     /// The shortest time between two frames.
     pause: Duration,
 }
 
 impl Pace {
+    fn new(timeout: Duration, pause: Duration) -> Pace {
+        Pace { recent: [Duration::ZERO; RECENT_ANSWERS], count: 0, timeout, pause }
+    }
+
     /// Records the time of an answer.
     fn note(&mut self, latency: Duration) {
-        self.slowest = latency.max(self.slowest * 7 / 8);
+        self.recent[self.count % RECENT_ANSWERS] = latency;
+        self.count += 1;
+    }
+
+    /// The time of the slowest recent answer. A single answer that is later than all others does not count.
+    fn slowest(&self) -> Duration {
+        let mut sorted = self.recent;
+        sorted.sort_unstable();
+        sorted[RECENT_ANSWERS - if self.count > 2 { 2 } else { 1 }]
     }
 
     /// The time-out of a step: 1.5 times the slowest answer plus a margin, doubled for each earlier time-out that was
     /// too short.
-    fn usual(self, extensions: u8) -> Duration {
-        self.stretched(MIN_STEP_TIMEOUT.max(self.pause).max(self.slowest * 3 / 2 + HOST_MARGIN), extensions)
+    fn usual(&self, extensions: u8) -> Duration {
+        self.stretched(MIN_STEP_TIMEOUT.max(self.pause).max(self.slowest() * 3 / 2 + HOST_MARGIN), extensions)
     }
 
     /// The time-out for an expected answer.
-    fn check(self, extensions: u8) -> Duration {
+    fn check(&self, extensions: u8) -> Duration {
         self.stretched(MIN_CHECK_TIMEOUT.max(self.usual(0) * 4), extensions)
     }
 
-    fn stretched(self, length: Duration, extensions: u8) -> Duration {
+    fn stretched(&self, length: Duration, extensions: u8) -> Duration {
         length.saturating_mul(2u32.saturating_pow(extensions.into())).min(self.timeout.max(MIN_STEP_TIMEOUT))
     }
 }
@@ -60,26 +77,79 @@ impl Lss<'_, '_> {
     /// # Errors
     /// Slaves answer, but no address can be confirmed; the bus failed or the user interrupted.
     pub fn fastscan(&mut self) -> Result<Option<LssAddress>, LssError> {
-        self.fastscan_beside(&[])
+        self.fastscan_beside(&[], None)
+    }
+
+    /// Switches all slaves to waiting state, and asks those without a node-ID for an answer. Does not wait for it: see
+    /// [`Lss::is_anyone_unconfigured`]. Returns the moment of the request.
+    ///
+    /// # Errors
+    /// The bus failed or the user interrupted.
+    pub fn ask_unconfigured(&mut self) -> Result<Mono, LssError> {
+        self.discard_received()?;
+        self.switch_global(Mode::Waiting)?;
+        self.send_now(Request::ANY_UNCONFIGURED.frame())
+    }
+
+    /// Whether a slave without a node-ID has answered since [`Lss::ask_unconfigured`], or answers within `timeout`
+    /// after that moment. A silent bus is asked again, but not before 200 ms, for slaves that need pauses; the second
+    /// answer has at least half of this time.
+    ///
+    /// # Errors
+    /// The bus failed or the user interrupted.
+    pub fn is_anyone_unconfigured(&mut self, asked: Mono, timeout: Duration) -> Result<bool, LssError> {
+        let mut until = asked + timeout;
+        if self.master.timing.retries > 0 {
+            if self.has_fastscan_answer(asked, asked + RETRY_PAUSE)? {
+                return Ok(true);
+            }
+            let again = self.send_now(Request::ANY_UNCONFIGURED.frame())?;
+            until = until.max(again + RETRY_PAUSE / 2);
+        }
+        self.has_fastscan_answer(asked, until)
+    }
+
+    fn has_fastscan_answer(&mut self, since: Mono, until: Mono) -> Result<bool, LssError> {
+        let until = until.max(self.master.now());
+        while !self.master.has_fastscan_answer_since(since) {
+            if self.next(until)?.is_none() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Like [`Lss::fastscan`], but ignores the slaves in `aside`. They are switched to configuration state:
     /// slaves in this state do not take part in fastscan (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that
     /// takes part anyway is found again.
     ///
+    /// `all_slaves` is the wait for an answer of any slave, for example if the slaves answered quickly before. Without
+    /// it, the time-out is used, and without an answer the scan is repeated with pauses.
+    ///
     /// # Errors
     /// As [`Lss::fastscan`], or a slave in `aside` does not answer.
-    pub fn fastscan_beside(&mut self, aside: &[LssAddress]) -> Result<Option<LssAddress>, LssError> {
-        match self.scan_with_pauses(aside, Duration::ZERO)? {
-            None if self.master.timing.retries > 0 => self.scan_with_pauses(aside, RETRY_PAUSE),
+    pub fn fastscan_beside(
+        &mut self,
+        aside: &[LssAddress],
+        all_slaves: Option<Duration>,
+    ) -> Result<Option<LssAddress>, LssError> {
+        match self.scan_with_pauses(aside, Duration::ZERO, all_slaves)? {
+            None if self.master.timing.retries > 0 && all_slaves.is_none() => {
+                self.scan_with_pauses(aside, RETRY_PAUSE, None)
+            }
             found => Ok(found),
         }
     }
 
     /// A fastscan with at least this time between two frames.
-    fn scan_with_pauses(&mut self, aside: &[LssAddress], pause: Duration) -> Result<Option<LssAddress>, LssError> {
+    fn scan_with_pauses(
+        &mut self,
+        aside: &[LssAddress],
+        pause: Duration,
+        all_slaves: Option<Duration>,
+    ) -> Result<Option<LssAddress>, LssError> {
         let mut scan = Fastscan::new(self.master.timing.retries);
-        let mut pace = Pace { slowest: Duration::ZERO, timeout: self.master.timing.timeout, pause };
+        let mut pace = Pace::new(self.master.timing.timeout, pause);
         self.is_configuring = true;
         self.discard_received()?;
         loop {
@@ -93,7 +163,7 @@ impl Lss<'_, '_> {
                 self.pause(pause)?;
             }
             let next_at = self.master.now() + pause;
-            let answers = self.step(step, &mut pace)?;
+            let answers = self.step(step, &mut pace, all_slaves)?;
             self.pause(next_at.since(self.master.now()))?;
             match scan.on_end(answers) {
                 Progress::Continue => {}
@@ -101,19 +171,22 @@ impl Lss<'_, '_> {
                     self.is_configuring = !aside.is_empty();
                     return Ok(None);
                 }
-                Progress::Found(address) if aside.is_empty() => return self.confirm(address).map(|()| Some(address)),
+                Progress::Found(address) if aside.is_empty() => {
+                    return self.confirm(address, &pace).map(|()| Some(address));
+                }
                 Progress::Found(address) => return self.readdress(address).map(|()| Some(address)),
                 Progress::Failed(error) => return Err(LssError::Fastscan(error)),
             }
         }
     }
 
-    /// Carries out one step and returns the number of answers.
-    fn step(&mut self, step: Step, pace: &mut Pace) -> Result<usize, LssError> {
+    /// Carries out one step. `all_slaves` is the wait for an answer of any slave, if it is not the time-out.
+    fn step(&mut self, step: Step, pace: &mut Pace, all_slaves: Option<Duration>) -> Result<usize, LssError> {
         let sent = self.send_now(step.request.frame())?;
         let usual = sent + pace.usual(step.extensions);
         let mut deadline = match step.wait {
-            Wait::AllSlaves | Wait::Advance => sent + pace.timeout,
+            Wait::AllSlaves => sent + all_slaves.unwrap_or(pace.timeout),
+            Wait::Advance => sent + pace.timeout,
             Wait::Check => sent + pace.check(step.extensions),
             Wait::Bit => usual,
         };
@@ -122,8 +195,8 @@ impl Lss<'_, '_> {
             if !Fastscan::is_answer(&received.frame) {
                 continue;
             }
-            answers += 1;
             let at = received.at.mono;
+            answers += 1;
             pace.note(at.since(sent));
             deadline = match step.wait {
                 Wait::AllSlaves => deadline.min(end_of_gathering(sent, at)),
@@ -134,11 +207,11 @@ impl Lss<'_, '_> {
         Ok(answers)
     }
 
-    fn confirm(&mut self, found: LssAddress) -> Result<(), LssError> {
-        match self.inquire_address() {
+    fn confirm(&mut self, found: LssAddress, pace: &Pace) -> Result<(), LssError> {
+        match self.inquire_address_within(pace.check(0), 0) {
             Ok(reported) if reported == found => Ok(()),
             Ok(reported) => Err(LssError::AddressMismatch { found, reported }),
-            // The service is optional.
+            // The service is optional. If the answer was lost or late, selective addressing decides too.
             Err(LssError::NoAnswer { .. }) => self.readdress(found),
             Err(error) => Err(error),
         }

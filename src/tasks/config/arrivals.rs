@@ -5,7 +5,7 @@ use crate::canopen::lss::LssAddress;
 use crate::master::Master;
 use crate::node::Overrides;
 use crate::node::wait::{Policy, pause};
-use crate::tasks::lss::{Descriptions, FoundSlave, Job, Target, Via, assign, scan};
+use crate::tasks::lss::{Descriptions, FoundSlave, Job, SearchTimes, Target, Via, assign, scan};
 use crate::tasks::{Failure, Kind, Note};
 use std::time::Duration;
 
@@ -72,7 +72,7 @@ fn look(master: &mut Master<'_>) -> Result<Option<Vec<FoundSlave>>, Failure> {
     // Without any device on the bus, no node acknowledges the requests.
     master.set_tolerates_outages(true);
     let paused = pause(master, master.now() + SEARCH_INTERVAL, Policy::Reconnect);
-    let found = paused.map_err(Failure::from).and_then(|()| scan(master, &mut |_| {}));
+    let found = paused.map_err(Failure::from).and_then(|()| scan(master, SearchTimes::default(), &mut |_| {}));
     master.set_tolerates_outages(false);
     match found {
         Ok(found) => Ok(Some(found)),

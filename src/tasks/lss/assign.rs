@@ -100,6 +100,7 @@ fn prepare(
     job: &Job<'_>,
     notify: Notify<'_>,
 ) -> Result<(LssDevice, AssignEntry, Option<PlannedRate>), Failure> {
+    let start = master.now();
     let device = resolve(master, &job.target, &job.descriptions, (job.via, job.force), notify)?;
     check_confirmed(device.node, device.model.as_deref())?;
     let method = choose_method(&device, job.via, job.store, notify)?;
@@ -111,7 +112,7 @@ fn prepare(
     }
     let changes_to = job.id.filter(|new| device.node != Some(*new));
     if let Some(new) = job.id.filter(|_| changes_to.is_some() || !device.is_alone)
-        && let Some(sign) = taken(master, new)?
+        && let Some(sign) = taken(master, new, start)?
     {
         return Err(device.failure(LssCause::Taken(new, sign)));
     }

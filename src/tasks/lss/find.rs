@@ -10,6 +10,7 @@ use crate::device::catalog::{self, Model};
 use crate::master::{Lss, LssError, Master};
 use crate::tasks::{Failure, Note};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// A device whose node-ID can be set.
 #[derive(Clone, Debug)]
@@ -22,13 +23,40 @@ pub struct FoundSlave {
     pub model: Option<Arc<Model>>,
 }
 
+/// How long a search waits for devices without a node-ID.
+#[derive(Clone, Copy, Debug)]
+pub struct SearchTimes {
+    /// The wait for an answer of any device, from the first request. Devices with a node-ID are searched meanwhile.
+    pub first: Duration,
+    /// The wait for an answer of further devices, after each of two requests. `None`: the time-out, and once more with
+    /// pauses between the frames.
+    pub further: Option<Duration>,
+}
+
+impl Default for SearchTimes {
+    /// 450 ms for the first device, which also has the time to need pauses between frames. All devices hear the first
+    /// request, and most have answered it while the node-IDs are scanned. So the wait for further devices is short.
+    fn default() -> SearchTimes {
+        SearchTimes { first: Duration::from_millis(450), further: Some(Duration::from_millis(75)) }
+    }
+}
+
+impl SearchTimes {
+    /// For slow devices: every wait has at least this time-out.
+    pub fn patient(timeout: Duration) -> SearchTimes {
+        SearchTimes { first: timeout, further: None }
+    }
+}
+
 /// Lists the devices with a node-ID (by SDO) and those without (by fastscan). A device found by fastscan stays in
 /// configuration state while the next one is searched. Nothing is changed.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C; the first fastscan failed. The failure of a later fastscan is an event. Without a device, the
 /// list is empty.
-pub fn scan(master: &mut Master<'_>, notify: Notify<'_>) -> Result<Vec<FoundSlave>, Failure> {
+pub fn scan(master: &mut Master<'_>, times: SearchTimes, notify: Notify<'_>) -> Result<Vec<FoundSlave>, Failure> {
+    master.listen(&Filters::All)?;
+    let asked = master.lss().ask_unconfigured()?;
     let mut slaves: Vec<FoundSlave> = nodes::identified(master)?
         .into_iter()
         .map(|found| FoundSlave {
@@ -39,7 +67,11 @@ pub fn scan(master: &mut Master<'_>, notify: Notify<'_>) -> Result<Vec<FoundSlav
         .collect();
     master.listen(&Filters::All)?;
     let mut lss = master.lss();
-    let unconfigured = unconfigured(&mut lss, notify);
+    let unconfigured = match lss.is_anyone_unconfigured(asked, times.first) {
+        Ok(true) => unconfigured(&mut lss, times.further, notify),
+        Ok(false) => Ok(Vec::new()),
+        Err(error) => Err(error),
+    };
     let left = lss.leave();
     let unconfigured = unconfigured?;
     left?;
@@ -51,10 +83,14 @@ pub fn scan(master: &mut Master<'_>, notify: Notify<'_>) -> Result<Vec<FoundSlav
 }
 
 /// Finds devices without a node-ID, until no further device answers.
-fn unconfigured(lss: &mut Lss<'_, '_>, notify: Notify<'_>) -> Result<Vec<LssAddress>, LssError> {
+fn unconfigured(
+    lss: &mut Lss<'_, '_>,
+    further: Option<Duration>,
+    notify: Notify<'_>,
+) -> Result<Vec<LssAddress>, LssError> {
     let mut found: Vec<LssAddress> = Vec::new();
     loop {
-        let reason = match lss.fastscan_beside(&found) {
+        let reason = match lss.fastscan_beside(&found, further.filter(|_| !found.is_empty())) {
             Ok(None) => return Ok(found),
             Ok(Some(address)) if !found.contains(&address) => {
                 found.push(address);

@@ -34,7 +34,7 @@ pub use confirm::Confirmed;
 pub use device::{Descriptions, DeviceName};
 pub use event::{AnotherSlave, LssEvent, LssFact, Reason, UnansweredService};
 pub use failure::{HostObstacle, LssCause, LssEffect, LssFailure, Neighbour, NextStep, NotReset, Setting};
-pub use find::{FoundSlave, identify, scan};
+pub use find::{FoundSlave, SearchTimes, identify, scan};
 pub use method::{PlannedRate, RequestedRate, check_rate, check_store};
 pub use node_id::{DuplicateSign, TakenSign};
 pub use progress::{Progress, Stage};

@@ -5,7 +5,6 @@ use super::failure::{LssCause, LssFailure};
 use crate::bus::{Fault, Filters, Mono};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
-use crate::canopen::nmt::Life;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::master::{Error, Happening, Master, Request, SdoError, SdoFailure};
@@ -178,43 +177,48 @@ fn is_collision(fault: Fault) -> bool {
 /// Whether a node-ID is in use: an SDO answer, a heartbeat or a boot-up message. A stopped node without heartbeat
 /// cannot be detected.
 ///
+/// What was received since `start` counts too: the node must be silent for [`LISTEN_TIME`], and after two requests. So
+/// requests of a scan are not repeated.
+///
 /// # Errors
 /// Bus errors and Ctrl-C.
-pub(super) fn taken(master: &mut Master<'_>, node: NodeId) -> Result<Option<TakenSign>, Failure> {
+pub(super) fn taken(master: &mut Master<'_>, node: NodeId, start: Mono) -> Result<Option<TakenSign>, Failure> {
     master.listen(&Filters::All)?;
     let timeout = master.timing().timeout.min(LISTEN_TIME / 3);
+    let sign = |master: &Master<'_>| match () {
+        () if master.has_answered_since(node, start) => Some(TakenSign::Answer),
+        () if master.has_lived_since(node, start) => Some(TakenSign::Heartbeat),
+        () => None,
+    };
+    let mut until = start + LISTEN_TIME;
+    if let Some(asked) = master.asked_twice_since(node, start) {
+        until = until.max(asked + timeout);
+    } else if sign(master).is_none() {
+        ask_twice(master, node, timeout)?;
+    }
+    let until = until.max(master.now());
+    let signed = |found: Option<TakenSign>| found.map_or(ControlFlow::Continue(()), ControlFlow::Break);
+    let waited = match sign(master) {
+        Some(sign) => return Ok(Some(sign)),
+        None => wait(master, until, Policy::Command, |master, _| signed(sign(master)))?,
+    };
+    Ok(waited.done())
+}
+
+/// Reads the device type twice, until the first answer or sign of life.
+fn ask_twice(master: &mut Master<'_>, node: NodeId, timeout: Duration) -> Result<(), Failure> {
+    // One of them or its answer may be lost.
     let start = master.now();
-    // Two requests: one of them or its answer may be lost.
     let requests = [(); 2].map(|()| Request::read(node, ObjectId::DEVICE_TYPE).once().within(timeout));
     let tickets = requests.map(|request| master.start(request));
     let mut open = tickets.len();
-    let on_event = |event: Happening, open: &mut usize| match event {
-        Happening::Sdo(ticket, result) if tickets.contains(&ticket) => {
-            *open -= 1;
-            match result {
-                Err(SdoError { failure: SdoFailure::NoAnswer { .. } | SdoFailure::Cancelled, .. }) => None,
-                Ok(_) | Err(_) => Some(TakenSign::Answer),
-            }
-        }
-        Happening::Frame(received) => {
-            Life::parse(&received.frame).filter(|(alive, _)| *alive == node).map(|_| TakenSign::Heartbeat)
-        }
-        _ => None,
-    };
-    let mut until_sign = |master: &mut Master<'_>, until: Mono, ends_with_requests: bool| {
-        wait(master, until, Policy::Command, |_, event| match on_event(event, &mut open) {
-            Some(sign) => ControlFlow::Break(Some(sign)),
-            None if ends_with_requests && open == 0 => ControlFlow::Break(None),
-            None => ControlFlow::Continue(()),
-        })
-        .map(|waited| waited.done().flatten())
-    };
-    let mut sign = until_sign(master, start + MAX_TRANSFER_TIME, true)?;
-    if sign.is_none() {
-        sign = until_sign(master, start + LISTEN_TIME, false)?;
-    }
+    wait(master, start + MAX_TRANSFER_TIME, Policy::Command, |master, event| {
+        open -= usize::from(matches!(event, Happening::Sdo(ticket, _) if tickets.contains(&ticket)));
+        let is_found = master.has_answered_since(node, start) || master.has_lived_since(node, start);
+        if open == 0 || is_found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
     master.forget(tickets.into_iter());
-    Ok(sign)
+    Ok(())
 }
 
 /// The identity of the only device with a node-ID.

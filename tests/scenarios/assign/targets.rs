@@ -1,6 +1,7 @@
 //! The named device is changed, and no other.
 
 use super::{Wanted, all_snapshots, bus, id, node, run};
+use cangauge::bus::Bus;
 use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Outbox, Station};
 use cangauge::bus::time::Mono;
@@ -434,4 +435,44 @@ fn unsupported_bit_rate_is_rejected_with_the_list() {
     let stored = bus.stations::<Device>().map(|device| device.stored().1).collect::<Vec<_>>();
     assert_eq!(stored[3].map(short_bit_rate).as_deref(), Some("100k"));
     assert_eq!(all_snapshots(&bus)[..3], before[..3]);
+}
+
+#[test]
+fn heartbeat_of_the_new_node_id_is_noticed_in_each_step() {
+    for millis in (20..1100).step_by(90) {
+        let mut bus = bus("device = [{ kind = 'mh4', node = 1 }]");
+        bus.attach(OneHeartbeat(Mono::at(Duration::from_millis(millis))));
+        let done = run(&mut bus, "1", &id(7));
+        assert!(done.failure().1.contains("(a node sends heartbeats)"), "{millis} ms: {:?}", done.failure());
+    }
+}
+
+/// A stopped node 7 that sends one heartbeat.
+struct OneHeartbeat(Mono);
+
+impl Station for OneHeartbeat {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
+
+    fn wake(&mut self, _: Mono, out: &mut Outbox) {
+        self.0 = Mono::at(Duration::MAX);
+        out.send("707#04".parse().expect("a frame"));
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        Some(self.0)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn setting_a_node_id_takes_less_than_two_seconds() {
+    let mut bus = bus("device = [{ kind = 'mh4', node = 1 }, { kind = 'dps', node = 3 }]");
+    let start = bus.mono();
+    let done = run(&mut bus, "1", &id(7));
+    assert_eq!(done.result.expect("done").confirmed, Confirmed::BootUp);
+    let took = bus.mono().since(start);
+    assert!(took < Duration::from_millis(1800), "{took:?}");
 }

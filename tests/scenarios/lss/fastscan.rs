@@ -7,6 +7,7 @@ use cangauge::bus::{Bus, Event, Mono};
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::lss::{FastscanError, LssAddress, Service};
 use cangauge::master::{LssError, Master, Timing};
+use cangauge::tasks::lss::{SearchTimes, scan as find};
 use std::time::Duration;
 
 const DPS: [u32; 4] = [0x362, 0x0044_3150, 0x0001_0000, 20002];
@@ -34,6 +35,86 @@ fn single_slave_is_found_within_a_second() {
             assert_eq!(configuring, [identity]);
             assert!(bus.mono() < Mono::at(Duration::from_secs(1)), "{identity:?} {latency}: {:?}", bus.mono());
         }
+    }
+}
+
+/// One answer of many is late, as on a busy host. Some slaves lose a frame that arrives before their answer.
+#[test]
+fn one_late_answer_costs_little_time() {
+    for drops_while_busy in [false, true] {
+        for late in [5_000, 10_000, 25_000] {
+            for number in 0..160 {
+                let mut latencies = vec![500; 1000];
+                latencies[number] = late;
+                let mut slave = Slave::new(DPS, 0xff).slow(&latencies);
+                slave.drops_while_busy = drops_while_busy;
+                let mut bus = bus_of([slave]);
+                let (found, configuring) = scan(&mut bus);
+                assert_eq!((found.unwrap(), configuring), (Some(address(DPS)), vec![DPS]), "{late} us at {number}");
+                // Without a late answer 395 ms, of which 250 ms are the frames at 250 kbit/s.
+                assert!(bus.mono() < ms(550), "{late} us at {number}: {:?}", bus.mono());
+            }
+        }
+    }
+}
+
+/// The devices that `lss scan` finds, and the duration in milliseconds.
+fn searched(slaves: impl IntoIterator<Item = Slave>, times: SearchTimes) -> (Vec<[u32; 4]>, u128) {
+    let mut bus = bus_of(slaves);
+    let found = find(&mut Master::new(&mut bus, Timing::default()), times, &mut |_| {}).unwrap();
+    let found = found.into_iter().filter_map(|slave| slave.address).map(|address| address.parts()).collect();
+    assert_eq!(configuring(&bus), [[0; 4]; 0]);
+    (found, bus.mono().since(Mono::START).as_millis())
+}
+
+#[test]
+fn search_without_devices_takes_half_a_second() {
+    let (found, took) = searched([Slave::new(DPS, 5)], SearchTimes::default());
+    assert_eq!(found.len(), 0);
+    assert!((450..500).contains(&took), "{took} ms");
+}
+
+#[test]
+fn search_for_one_device_takes_a_second() {
+    // The DPS manual names no inquiries: the device is silent once it is selected.
+    for silent in [&[][..], &[0x5a, 0x5b, 0x5c, 0x5d, 0x5e]] {
+        for latencies in [&[200][..], &[1000, 1500, 200]] {
+            let slave = Slave::new(DPS, 0xff).without(silent.iter().copied()).slow(latencies);
+            let (found, took) = searched([slave], SearchTimes::default());
+            assert_eq!(found, [DPS], "{silent:?}");
+            // 65 ms of the requests of the scan, and 250 ms of fastscan, are the frames at 250 kbit/s.
+            assert!(took < 1200, "{silent:?} {latencies:?}: {took} ms");
+        }
+    }
+}
+
+#[test]
+fn search_finds_slow_devices_and_devices_that_need_pauses() {
+    for (latency, pause, times) in [
+        (400_000, 0, SearchTimes::default()),
+        (950_000, 0, SearchTimes::patient(Duration::from_secs(1))),
+        (300, 190, SearchTimes::default()),
+        (300, 190, SearchTimes::patient(Duration::from_secs(1))),
+    ] {
+        let mut slave = Slave::new(DPS, 0xff).slow(&[latency]);
+        slave.pause = Duration::from_millis(pause);
+        let mut bus = bus_of([slave]);
+        let timing = Timing { timeout: times.first, ..Timing::default() };
+        let found = find(&mut Master::new(&mut bus, timing), times, &mut |_| {}).unwrap();
+        assert_eq!(found.len(), 1, "{latency} us, {pause} ms, {times:?}");
+    }
+}
+
+#[test]
+fn search_finds_several_devices() {
+    let identities = [DPS, [0x362, 0x0044_3150, 0x0001_0000, 20003], [0x47, 1, 0x0001_0007, 99]];
+    for latencies in [[300, 300, 300], [200, 900, 1600], [100, 15_000, 200], [5000, 100, 100]] {
+        let slaves = identities.iter().zip(latencies).map(|(&it, latency)| Slave::new(it, 0xff).slow(&[latency]));
+        let (mut found, _) = searched(slaves, SearchTimes::default());
+        found.sort();
+        let mut expected = identities.to_vec();
+        expected.sort();
+        assert_eq!(found, expected, "{latencies:?}");
     }
 }
 
@@ -74,7 +155,7 @@ fn three_slaves_are_found_without_changing_them() {
         let mut master = Master::new(&mut bus, Timing::default());
         let mut lss = master.lss();
         let mut found: Vec<LssAddress> = Vec::new();
-        while let Some(address) = lss.fastscan_beside(&found).unwrap() {
+        while let Some(address) = lss.fastscan_beside(&found, None).unwrap() {
             assert!(!found.contains(&address), "{address} twice");
             found.push(address);
         }

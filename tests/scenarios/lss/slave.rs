@@ -25,6 +25,8 @@ pub(super) struct Slave {
     pub(super) loses: BTreeSet<usize>,
     /// It loses frames that arrive within this time after the previous one.
     pub(super) pause: Duration,
+    /// It loses frames that arrive while an answer waits.
+    pub(super) drops_while_busy: bool,
     /// When it received the last frame that was not lost.
     received_at: Option<Mono>,
     /// The number of services it received that address one slave.
@@ -49,6 +51,7 @@ impl Slave {
             answers_all_fastscans: None,
             loses: BTreeSet::new(),
             pause: Duration::ZERO,
+            drops_while_busy: false,
             received_at: None,
             commands: 0,
             selected: 0,
@@ -160,7 +163,8 @@ impl Station for Slave {
 
     fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
         let (true, Some(data)) = (frame.id() == CanId::LSS_MASTER, frame.all_eight()) else { return };
-        if self.received_at.is_some_and(|at| now.since(at) < self.pause) {
+        let is_busy = self.drops_while_busy && !self.waiting.is_empty();
+        if is_busy || self.received_at.is_some_and(|at| now.since(at) < self.pause) {
             return;
         }
         self.received_at = Some(now);
