@@ -40,20 +40,20 @@ fn node() -> NodeId {
 }
 
 /// A device on its own bus.
-struct Desk<'a> {
+struct DeviceUnderTest<'a> {
     model: &'a Arc<Model>,
     master: Master<'a>,
 }
 
-fn with_desk(model: &Arc<Model>, work: impl FnOnce(&mut Desk<'_>)) {
+fn with_device(model: &Arc<Model>, work: impl FnOnce(&mut DeviceUnderTest<'_>)) {
     let bit_rate = model.description.factory.bit_rate.unwrap_or(250_000);
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(bit_rate);
     bus.attach(Device::new(Setup::new(Arc::clone(model), node())).expect("a device"));
     let timing = Timing { timeout: Duration::from_millis(500), retries: 0 };
-    work(&mut Desk { model, master: Master::new(&mut bus, timing) });
+    work(&mut DeviceUnderTest { model, master: Master::new(&mut bus, timing) });
 }
 
-impl Desk<'_> {
+impl DeviceUnderTest<'_> {
     fn name(&self) -> &str {
         &self.model.description.name
     }
@@ -104,7 +104,7 @@ impl Desk<'_> {
     }
 
     /// Makes PDO parameters writable: disables the PDO and empties its mapping.
-    fn clear_the_way(&mut self, object: ObjectId) {
+    fn make_pdo_writable(&mut self, object: ObjectId) {
         let communication = (0x1800..0x1a00).contains(&object.index);
         // The inhibit time can be written only while the PDO is disabled.
         if !(is_mapping(object) || communication && object.sub == 3) {
@@ -153,12 +153,12 @@ fn limits(data_type: DataType) -> Option<(f64, f64)> {
 #[test]
 fn readable_objects_return_values_of_their_type() {
     for model in built_in() {
-        with_desk(model, |desk| {
+        with_device(model, |device| {
             for (entry, described) in described(model) {
-                let place = format!("{} {} {}", desk.name(), entry.object, entry.full_name());
-                let read = desk.read(&entry);
+                let place = format!("{} {} {}", device.name(), entry.object, entry.full_name());
+                let read = device.read(&entry);
                 if !entry.access.is_readable() {
-                    assert_eq!(read, Err(desk.listed(&[WRITE_ONLY])), "{place}");
+                    assert_eq!(read, Err(device.listed(&[WRITE_ONLY])), "{place}");
                     continue;
                 }
                 let value = read.unwrap_or_else(|code| panic!("{place}: {code:08X}"));
@@ -177,15 +177,19 @@ fn readable_objects_return_values_of_their_type() {
 #[test]
 fn read_only_objects_refuse_writes_and_keep_their_value() {
     for model in built_in() {
-        with_desk(model, |desk| {
+        with_device(model, |device| {
             for (entry, _) in described(model).into_iter().filter(|(entry, _)| !entry.access.is_writable()) {
-                let place = format!("{} {} {}", desk.name(), entry.object, entry.full_name());
+                let place = format!("{} {} {}", device.name(), entry.object, entry.full_name());
                 let width = entry.data_type.width().unwrap_or(4).min(4);
-                let before = desk.read(&entry).expect("readable");
-                assert_eq!(desk.write(entry.object, &[0x55; 4][..width]), Err(desk.listed(&[READ_ONLY])), "{place}");
+                let before = device.read(&entry).expect("readable");
+                assert_eq!(
+                    device.write(entry.object, &[0x55; 4][..width]),
+                    Err(device.listed(&[READ_ONLY])),
+                    "{place}"
+                );
                 let measured = entry.object.index >= 0x6000 || MEASURED.contains(&&*entry.name);
                 if !measured {
-                    assert_eq!(desk.read(&entry), Ok(before), "{place}");
+                    assert_eq!(device.read(&entry), Ok(before), "{place}");
                 }
             }
         });
@@ -195,16 +199,16 @@ fn read_only_objects_refuse_writes_and_keep_their_value() {
 #[test]
 fn missing_objects_are_refused() {
     for model in built_in() {
-        with_desk(model, |desk| {
+        with_device(model, |device| {
             let u8 = DataType::Unsigned(1);
-            assert_eq!(desk.read_as(ObjectId::new(0x5fff, 0), u8), Err(NO_OBJECT), "{}", desk.name());
-            assert_eq!(desk.write(ObjectId::new(0x5fff, 0), &[0]), Err(NO_OBJECT), "{}", desk.name());
-            let missing = desk.listed(&[NO_SUB_INDEX]);
+            assert_eq!(device.read_as(ObjectId::new(0x5fff, 0), u8), Err(NO_OBJECT), "{}", device.name());
+            assert_eq!(device.write(ObjectId::new(0x5fff, 0), &[0]), Err(NO_OBJECT), "{}", device.name());
+            let missing = device.listed(&[NO_SUB_INDEX]);
             let record =
                 model.dictionary.iter().find(|entry| entry.object.sub > 0).expect("an object with sub-indices");
             let object = ObjectId::new(record.object.index, 99);
-            assert_eq!(desk.read_as(object, u8), Err(missing), "{} {object}", desk.name());
-            assert_eq!(desk.write(object, &[0]), Err(missing), "{} {object}", desk.name());
+            assert_eq!(device.read_as(object, u8), Err(missing), "{} {object}", device.name());
+            assert_eq!(device.write(object, &[0]), Err(missing), "{} {object}", device.name());
         });
     }
 }
@@ -221,9 +225,9 @@ fn writable_objects_accept_allowed_values_only() {
                 continue;
             }
             // Each object on a new device, so that the writes are independent.
-            with_desk(model, |desk| {
-                let place = format!("{} {} {}", desk.name(), entry.object, entry.full_name());
-                desk.clear_the_way(entry.object);
+            with_device(model, |device| {
+                let place = format!("{} {} {}", device.name(), entry.object, entry.full_name());
+                device.make_pdo_writable(entry.object);
                 // The type alone does not limit unit codes.
                 let type_limits = limits(entry.data_type).filter(|_| entry.object.index != 0x6131);
                 let low = number(&entry.low, entry.data_type).or(type_limits.map(|(low, _)| low));
@@ -235,13 +239,13 @@ fn writable_objects_accept_allowed_values_only() {
                     .chain(if described.allow.is_empty() { [low, high] } else { [None; 2] }.into_iter().flatten())
                     .chain(if entry.data_type == DataType::Real32 { vec![-12.5, 0.25] } else { Vec::new() })
                     .chain(ends)
-                    .filter(|&good| !is_mapping(entry.object) || is_sound(desk, entry.object, good))
+                    .filter(|&good| !is_mapping(entry.object) || is_possible(device, entry.object, good))
                     .collect();
                 for good in good {
                     assert!(described.allows(good), "{place}: the test is wrong about {good}");
-                    assert_eq!(desk.write_number(&entry, good), Ok(()), "{place}: {good}");
+                    assert_eq!(device.write_number(&entry, good), Ok(()), "{place}: {good}");
                     if entry.access == Access::Rw {
-                        let held = desk.read(&entry).expect("readable").as_f64();
+                        let held = device.read(&entry).expect("readable").as_f64();
                         assert_eq!(held, Some(good), "{place}");
                     }
                     inside += 1;
@@ -249,7 +253,7 @@ fn writable_objects_accept_allowed_values_only() {
                 if entry.access == Access::Wo {
                     return;
                 }
-                let held = desk.read(&entry).expect("readable");
+                let held = device.read(&entry).expect("readable");
                 let beyond = [
                     (low.map(|low| low - 1.0), [TOO_LOW, VALUE, TOO_HIGH]),
                     (high.map(|high| high + 1.0), [TOO_HIGH, VALUE, TOO_HIGH]),
@@ -260,22 +264,22 @@ fn writable_objects_accept_allowed_values_only() {
                     let Some(bad) = bad.filter(fits) else { continue };
                     let in_list = described.low.is_none() && described.high.is_none() && !described.allow.is_empty();
                     let codes = if in_list { [VALUE, TOO_HIGH, TOO_HIGH] } else { codes };
-                    let refused = desk.write_number(&entry, bad);
+                    let refused = device.write_number(&entry, bad);
                     if is_mapping(entry.object) && entry.object.sub > 0 {
                         assert!(refused.is_err(), "{place}: {bad}");
                     } else {
-                        assert_eq!(refused, Err(desk.listed(&codes)), "{place}: {bad}");
+                        assert_eq!(refused, Err(device.listed(&codes)), "{place}: {bad}");
                     }
-                    assert_eq!(desk.read(&entry), Ok(held.clone()), "{place}: the old value is held");
+                    assert_eq!(device.read(&entry), Ok(held.clone()), "{place}: the old value is held");
                     outside += 1;
                 }
                 // A wrong width, if sizes are indicated.
                 let width = entry.data_type.width().expect("it has one");
                 if model.description.sdo.size == SizeIndication::Indicated {
                     let wrong = if width == 4 { 2 } else { 4 };
-                    let refused = desk.write(entry.object, &[0; 4][..wrong]);
-                    assert_eq!(refused, Err(desk.listed(&[LENGTH])), "{place}");
-                    assert_eq!(desk.read(&entry), Ok(held), "{place}");
+                    let refused = device.write(entry.object, &[0; 4][..wrong]);
+                    assert_eq!(refused, Err(device.listed(&[LENGTH])), "{place}");
+                    assert_eq!(device.read(&entry), Ok(held), "{place}");
                 }
             });
         }
@@ -301,33 +305,33 @@ fn is_mapping(object: ObjectId) -> bool {
 }
 
 /// Whether a number is possible in a mapping object: an existing entry, or the count of mapped entries.
-fn is_sound(desk: &Desk<'_>, object: ObjectId, number: f64) -> bool {
+fn is_possible(device: &DeviceUnderTest<'_>, object: ObjectId, number: f64) -> bool {
     if object.sub > 0 {
         return number == 0.0
-            || desk.model.dictionary.get(object).and_then(|entry| crate::number(&entry.default, entry.data_type))
+            || device.model.dictionary.get(object).and_then(|entry| crate::number(&entry.default, entry.data_type))
                 == Some(number);
     }
-    let entries = (1..=64).map_while(|sub| desk.model.dictionary.get(object.with_sub(sub)));
+    let entries = (1..=64).map_while(|sub| device.model.dictionary.get(object.with_sub(sub)));
     let mapped =
         entries.take_while(|entry| crate::number(&entry.default, entry.data_type).is_some_and(|word| word != 0.0));
     number <= mapped.count() as f64
 }
 
 #[test]
-fn only_the_right_signature_acts() {
+fn only_the_right_signature_has_an_effect() {
     for model in built_in() {
         for (entry, described) in described(model) {
             let Some(signature) = described.signature else { continue };
-            with_desk(model, |desk| {
-                let place = format!("{} {} {}", desk.name(), entry.object, entry.full_name());
-                let refused = Err(desk.listed(&[NOT_STORED]));
+            with_device(model, |device| {
+                let place = format!("{} {} {}", device.name(), entry.object, entry.full_name());
+                let refused = Err(device.listed(&[NOT_STORED]));
                 for wrong in [&b"evas"[..], b"SAVE", &[0; 4], b"lolo"] {
-                    assert_eq!(desk.write(entry.object, wrong), refused, "{place}: {wrong:?}");
+                    assert_eq!(device.write(entry.object, wrong), refused, "{place}: {wrong:?}");
                 }
                 let right = if signature == Signature::Set { "\u{3}set" } else { signature.as_str() };
-                assert_eq!(desk.write(entry.object, right.as_bytes()), Ok(()), "{place}");
+                assert_eq!(device.write(entry.object, right.as_bytes()), Ok(()), "{place}");
                 if signature == Signature::Set {
-                    assert_eq!(desk.read(&entry), Ok(Value::Unsigned(3)), "{place}");
+                    assert_eq!(device.read(&entry), Ok(Value::Unsigned(3)), "{place}");
                 }
             });
         }
@@ -342,20 +346,20 @@ fn guarding_and_heartbeat_exclude_each_other_as_described() {
             described(model).into_iter().filter(|(_, described)| !described.only_if_zero.is_empty())
         {
             for &other in &described.only_if_zero {
-                with_desk(model, |desk| {
-                    let place = format!("{} {} {other}", desk.name(), entry.object);
+                with_device(model, |device| {
+                    let place = format!("{} {} {other}", device.name(), entry.object);
                     let width = |object| {
                         let entry: &Entry = model.dictionary.get(object).expect("described");
                         entry.data_type.width().expect("a number")
                     };
                     let five = [5, 0, 0, 0];
-                    desk.write(other, &five[..width(other)]).expect("it is free");
-                    let refused = Err(desk.listed(&[NOT_STORED]));
-                    assert_eq!(desk.write(entry.object, &five[..width(entry.object)]), refused, "{place}");
-                    assert_eq!(desk.read(&entry), Ok(Value::Unsigned(0)), "{place}");
-                    desk.write(other, &[0; 4][..width(other)]).expect("off is allowed");
-                    assert_eq!(desk.write(entry.object, &five[..width(entry.object)]), Ok(()), "{place}");
-                    assert_eq!(desk.read(&entry), Ok(Value::Unsigned(5)), "{place}");
+                    device.write(other, &five[..width(other)]).expect("it is free");
+                    let refused = Err(device.listed(&[NOT_STORED]));
+                    assert_eq!(device.write(entry.object, &five[..width(entry.object)]), refused, "{place}");
+                    assert_eq!(device.read(&entry), Ok(Value::Unsigned(0)), "{place}");
+                    device.write(other, &[0; 4][..width(other)]).expect("off is allowed");
+                    assert_eq!(device.write(entry.object, &five[..width(entry.object)]), Ok(()), "{place}");
+                    assert_eq!(device.read(&entry), Ok(Value::Unsigned(5)), "{place}");
                 });
                 tested += 1;
             }
@@ -370,9 +374,9 @@ fn cob_ids_change_by_the_rules_only() {
         let is_settable =
             |entry: &Entry| entry.object.sub == 1 && is_cob_id(entry.object) && entry.access != Access::Ro;
         for (entry, _) in described(model).into_iter().filter(|(entry, _)| is_settable(entry)) {
-            with_desk(model, |desk| {
-                let place = format!("{} {}", desk.name(), entry.object);
-                let mut put = |word: u32| desk.write(entry.object, &word.to_le_bytes());
+            with_device(model, |device| {
+                let place = format!("{} {}", device.name(), entry.object);
+                let mut put = |word: u32| device.write(entry.object, &word.to_le_bytes());
                 // Disable, move, enable.
                 assert_eq!(put(0x8000_0199), Ok(()), "{place}");
                 assert_eq!(put(0x0000_0199), Ok(()), "{place}");
@@ -384,7 +388,7 @@ fn cob_ids_change_by_the_rules_only() {
                     }
                     assert!(put(bad).is_err(), "{place}: {bad:08X}");
                 }
-                assert_eq!(desk.read(&entry), Ok(Value::Unsigned(0x199)), "{place}");
+                assert_eq!(device.read(&entry), Ok(Value::Unsigned(0x199)), "{place}");
             });
         }
     }
@@ -393,12 +397,12 @@ fn cob_ids_change_by_the_rules_only() {
 #[test]
 fn hydac_zero_restores_the_default_cob_id() {
     let model = cangauge::device::catalog::by_name("hydac").expect("built in");
-    with_desk(&model, |desk| {
+    with_device(&model, |device| {
         for (object, default) in [(ObjectId::new(0x1800, 1), 0x4000_0189), (ObjectId::new(0x1014, 0), 0x89)] {
             let entry = model.dictionary.get(object).expect("described").clone();
-            desk.write(object, &0x8000_0199u32.to_le_bytes()).expect("off, and elsewhere");
-            desk.write(object, &[0; 4]).expect("the default");
-            assert_eq!(desk.read(&entry), Ok(Value::Unsigned(default)), "{object}");
+            device.write(object, &0x8000_0199u32.to_le_bytes()).expect("off, and elsewhere");
+            device.write(object, &[0; 4]).expect("the default");
+            assert_eq!(device.read(&entry), Ok(Value::Unsigned(default)), "{object}");
         }
     });
 }
@@ -407,9 +411,9 @@ fn hydac_zero_restores_the_default_cob_id() {
 fn only_zero_deletes_the_history() {
     for model in built_in() {
         let Some(entry) = model.dictionary.get(ObjectId::new(0x1003, 0)) else { continue };
-        with_desk(model, |desk| {
-            assert_eq!(desk.write(entry.object, &[0]), Ok(()), "{}", desk.name());
-            assert!(desk.write(entry.object, &[1]).is_err(), "{}", desk.name());
+        with_device(model, |device| {
+            assert_eq!(device.write(entry.object, &[0]), Ok(()), "{}", device.name());
+            assert!(device.write(entry.object, &[1]).is_err(), "{}", device.name());
         });
     }
 }
@@ -440,14 +444,14 @@ fn index(object: &ObjectEntry) -> u16 {
 fn hydac_stores_its_node_id_with_1010h_4_only() {
     let model = cangauge::device::catalog::by_name("hydac").expect("built in");
     for (sub, expected) in [(1, 9), (4, 12)] {
-        with_desk(&model, |desk| {
-            desk.write(ObjectId::new(0x2003, 2), &[12]).expect("pending");
-            desk.write(ObjectId::new(0x1010, sub), b"save").expect("saved");
-            desk.master.send("000#8109".parse().expect("a frame"));
-            let later = desk.master.now() + Duration::from_secs(1);
+        with_device(&model, |device| {
+            device.write(ObjectId::new(0x2003, 2), &[12]).expect("pending");
+            device.write(ObjectId::new(0x1010, sub), b"save").expect("saved");
+            device.master.send("000#8109".parse().expect("a frame"));
+            let later = device.master.now() + Duration::from_secs(1);
             let mut heard = Vec::new();
-            while desk.master.now() < later {
-                if let Happening::Frame(received) = desk.master.next(later).expect("the bus works") {
+            while device.master.now() < later {
+                if let Happening::Frame(received) = device.master.next(later).expect("the bus works") {
                     heard.push(received.frame.to_string());
                 }
             }
@@ -473,8 +477,8 @@ fn the_abort_codes_of_the_manuals() {
     ];
     for (name, index, sub, bytes, code) in cases {
         let model = cangauge::device::catalog::by_name(name).expect("built in");
-        with_desk(&model, |desk| {
-            assert_eq!(desk.write(ObjectId::new(index, sub), bytes), Err(code), "{name} {index:04X}h:{sub}");
+        with_device(&model, |device| {
+            assert_eq!(device.write(ObjectId::new(index, sub), bytes), Err(code), "{name} {index:04X}h:{sub}");
         });
     }
 }

@@ -627,7 +627,7 @@ fn sixteen_channels_over_four_tpdos() {
 }
 
 #[test]
-fn spelling_of_the_file_is_a_name() {
+fn objects_are_found_by_their_spelling_in_the_file() {
     let eds = load(
         "31-spellings.eds",
         &[

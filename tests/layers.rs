@@ -124,7 +124,7 @@ const LONG: &[(&str, &str, usize)] =
     &[("canopen/value.rs", "encode_text", 65), ("sim/sdo_server/tests.rs", "block_download", 62)];
 
 /// Every line that violates one of the four rules below (CONTRIBUTING.md, Rules).
-fn second_places(source: &Source) -> Vec<(&'static str, usize)> {
+fn rule_violations(source: &Source) -> Vec<(&'static str, usize)> {
     let mut found = Vec::new();
     let is_in = |layers: &[&str]| layers.contains(&source.layer());
     if is_in(&["cli"]) {
@@ -174,7 +174,7 @@ fn forbidden_uses(source: &Source) -> Vec<String> {
 }
 
 /// Uses of other crates, clocks, `unsafe` and printing macros that are not for this layer.
-fn forbidden_means(source: &Source) -> Vec<String> {
+fn forbidden_calls(source: &Source) -> Vec<String> {
     let layer = source.layer();
     let mut found = Vec::new();
     let mut add = |line: usize, what: &str, why: &str| found.push(format!("src/{}:{line}: {what}: {why}", source.file));
@@ -242,8 +242,8 @@ fn every_use_follows_an_arrow() {
 }
 
 #[test]
-fn every_layer_uses_only_its_means() {
-    assert_none(&sources().flat_map(forbidden_means).collect::<Vec<_>>());
+fn every_layer_calls_only_allowed_functions() {
+    assert_none(&sources().flat_map(forbidden_calls).collect::<Vec<_>>());
 }
 
 #[test]
@@ -296,10 +296,10 @@ fn files_and_functions_are_short() {
 }
 
 #[test]
-fn text_waits_and_writes_have_one_place_each() {
+fn texts_waits_and_writes_are_in_one_module_each() {
     let places = sources().flat_map(|source| {
         let file = &source.file;
-        second_places(source).into_iter().map(move |(rule, line)| format!("src/{file}:{line}: {rule}"))
+        rule_violations(source).into_iter().map(move |(rule, line)| format!("src/{file}:{line}: {rule}"))
     });
     assert_none(&places.collect::<Vec<_>>());
 }
@@ -309,7 +309,7 @@ fn text_waits_and_writes_have_one_place_each() {
 fn violations_are_found() {
     let found = |file: &str, text: &str| -> Vec<String> {
         let source = Source::parse(file, text);
-        let all = forbidden_uses(&source).into_iter().chain(forbidden_means(&source));
+        let all = forbidden_uses(&source).into_iter().chain(forbidden_calls(&source));
         all.map(|line| line.trim_start_matches("src/").to_owned()).collect()
     };
     assert_eq!(found("canopen/a.rs", "use crate::bus::Bus;"), ["canopen/a.rs:1: bus::Bus: canopen must not use bus"]);
@@ -344,7 +344,7 @@ fn violations_are_found() {
     assert_eq!(source.test_files, ["canopen/script"]);
     assert_eq!(source.functions, [(4, "f".to_owned(), 3)]);
     let second = Source::parse("tasks/a.rs", "fn f() { master.next(t); Request::write(a); g(\"cangauge scan\"); }");
-    assert_eq!(second_places(&second).iter().map(|(rule, _)| *rule).collect::<Vec<_>>(), [COMMANDS, WRITES, WAITS]);
+    assert_eq!(rule_violations(&second).iter().map(|(rule, _)| *rule).collect::<Vec<_>>(), [COMMANDS, WRITES, WAITS]);
     let named = Source::parse("measure/a.rs", "fn f() { if name == \"mh4\" || matches!(name, \"mh40\" | \"dps\") {} }");
     let [first, second] = &device_names([named].iter())[..] else { panic!("two names") };
     assert_eq!(first, "src/measure/a.rs:1: \"mh4\" is the name of a device");

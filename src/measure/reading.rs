@@ -287,7 +287,7 @@ mod tests {
     const UNKNOWN: MeasuringRange = MeasuringRange::Unknown;
 
     #[test]
-    fn integer_at_its_end_is_clipped_if_the_range_goes_further() {
+    fn integer_at_its_limit_is_clipped_if_the_range_is_larger() {
         let psi = signal(Some(3), MeasuringRange::Known(-50.0, 100.0));
         for status in [None, Some(0)] {
             assert_eq!(sample(&psi, I16, &[0xff, 0x7f], status), (String::new(), "clipped"));
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn integer_at_the_end_of_its_type_is_kept_if_the_range_is_unknown_or_it_is_not_a_signal() {
+    fn integer_at_its_limit_is_kept_without_a_known_range() {
         let reading = Reading::of_signal(&signal(Some(0), UNKNOWN), Some(I16), 0);
         let found = reading.sample(Stamp::default(), &[0xff, 0x7f], None).expect("a number");
         assert_eq!((found.value.is_some(), found.doubt), (true, Some(Doubt::EndOfType)));

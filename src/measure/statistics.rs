@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn mean_and_deviation_of_a_far_off_signal() {
+    fn mean_and_deviation_of_a_signal_far_from_zero() {
         // A naive sum of squares has no correct digit here.
         let mut statistics = Statistics::default();
         for (at, value) in [1e9 + 4.0, 1e9 + 7.0, 1e9 + 13.0, 1e9 + 16.0].into_iter().enumerate() {

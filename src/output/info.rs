@@ -314,7 +314,7 @@ mod tests {
     use crate::canopen::value::Value;
 
     #[test]
-    fn a_date_is_shown_only_if_its_numbers_are_one() {
+    fn only_valid_dates_are_shown_as_dates() {
         let date = |parts: [u64; 3]| date(&Date { parts: parts.map(Value::Unsigned) });
         assert_eq!(date([2016, 4, 1]), "2016-04-01");
         assert_eq!(date([16, 4, 1]), "year 16, month 4, day 1");

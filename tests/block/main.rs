@@ -9,7 +9,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::{BlockDownload, BlockSize, BlockUpload, DownloadSize, Progress, TransferError};
 use proptest::prelude::*;
-use server::{Manner, Server};
+use server::{Server, ServerBehaviour};
 use std::collections::VecDeque;
 
 const OBJECT: ObjectId = ObjectId::new(0x2000, 1);
@@ -169,10 +169,10 @@ fn data() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-fn manner(crc: impl Strategy<Value = bool>) -> impl Strategy<Value = Manner> {
+fn behaviour(crc: impl Strategy<Value = bool>) -> impl Strategy<Value = ServerBehaviour> {
     let block_size = prop_oneof![1..=8u8, Just(127), 1..=127u8];
     (crc, any::<bool>(), prop::collection::vec(block_size, 1..4), any::<bool>())
-        .prop_map(|(crc, announces, block_sizes, hasty)| Manner { crc, announces, block_sizes, hasty })
+        .prop_map(|(crc, announces, block_sizes, hasty)| ServerBehaviour { crc, announces, block_sizes, hasty })
 }
 
 fn fates(kinds: &'static [Fate]) -> impl Strategy<Value = Vec<Fate>> {
@@ -185,15 +185,25 @@ fn fates(kinds: &'static [Fate]) -> impl Strategy<Value = Vec<Fate>> {
 const LOSSES: &[Fate] = &[Fate::Lost];
 const EVERYTHING: &[Fate] = &[Fate::Lost, Fate::Doubled, Fate::Swapped];
 
-fn download(data: &[u8], size: DownloadSize, manner: Manner, line: Line) -> (Result<(), TransferError>, Server) {
-    let mut server = Server::new(node(), b"before".to_vec(), manner);
+fn download(
+    data: &[u8],
+    size: DownloadSize,
+    behaviour: ServerBehaviour,
+    line: Line,
+) -> (Result<(), TransferError>, Server) {
+    let mut server = Server::new(node(), b"before".to_vec(), behaviour);
     let mut client = BlockDownload::new(node(), OBJECT, data.to_vec(), size);
     let result = run(&mut client, &mut server, line);
     (result, server)
 }
 
-fn upload(data: &[u8], block_size: u8, manner: Manner, line: Line) -> (Result<Vec<u8>, TransferError>, Server) {
-    let mut server = Server::new(node(), data.to_vec(), manner);
+fn upload(
+    data: &[u8],
+    block_size: u8,
+    behaviour: ServerBehaviour,
+    line: Line,
+) -> (Result<Vec<u8>, TransferError>, Server) {
+    let mut server = Server::new(node(), data.to_vec(), behaviour);
     let mut client = BlockUpload::new(node(), OBJECT, 0, false);
     client = client.with_block_size(BlockSize::new(block_size).unwrap());
     let result = run(&mut client, &mut server, line);
@@ -204,14 +214,14 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn transfers_without_faults_succeed(data in data(), manner in manner(any::<bool>()), block_size in 1..=127u8) {
+    fn transfers_without_faults_succeed(data in data(), behaviour in behaviour(any::<bool>()), block_size in 1..=127u8) {
         for size in [DownloadSize::Indicated, DownloadSize::Omitted] {
-            let (result, server) = download(&data, size, manner.clone(), Line::new(Vec::new(), false));
+            let (result, server) = download(&data, size, behaviour.clone(), Line::new(Vec::new(), false));
             prop_assert_eq!(result, Ok(()));
             prop_assert!(server.is_idle());
             prop_assert!(server.object == data);
         }
-        let (result, server) = upload(&data, block_size, manner, Line::new(Vec::new(), false));
+        let (result, server) = upload(&data, block_size, behaviour, Line::new(Vec::new(), false));
         prop_assert!(result == Ok(data));
         prop_assert!(server.is_idle());
     }
@@ -220,11 +230,11 @@ proptest! {
     /// assign a segment to a sub-block if its acknowledge was lost; it needs the size.)
     #[test]
     fn a_download_that_loses_frames_is_right_or_fails(
-        data in data(), mut manner in manner(any::<bool>()), omit in any::<bool>(), fates in fates(LOSSES)
+        data in data(), mut behaviour in behaviour(any::<bool>()), omit in any::<bool>(), fates in fates(LOSSES)
     ) {
-        manner.hasty &= !omit;
+        behaviour.hasty &= !omit;
         let size = if omit { DownloadSize::Omitted } else { DownloadSize::Indicated };
-        let (result, server) = download(&data, size, manner, Line::new(fates, true));
+        let (result, server) = download(&data, size, behaviour, Line::new(fates, true));
         match result {
             Ok(()) => prop_assert!(server.object == data),
             // The answer to the last frame may be lost.
@@ -235,9 +245,9 @@ proptest! {
 
     #[test]
     fn an_upload_that_loses_frames_is_right_or_fails(
-        data in data(), manner in manner(any::<bool>()), block_size in 1..=127u8, fates in fates(LOSSES)
+        data in data(), behaviour in behaviour(any::<bool>()), block_size in 1..=127u8, fates in fates(LOSSES)
     ) {
-        let (result, _) = upload(&data, block_size, manner, Line::new(fates, true));
+        let (result, _) = upload(&data, block_size, behaviour, Line::new(fates, true));
         if let Ok(bytes) = result {
             prop_assert!(bytes == data);
         }
@@ -246,9 +256,9 @@ proptest! {
     /// Any faults, with a CRC. The CRC does not detect the number of leading zeros; the size does.
     #[test]
     fn a_download_over_a_bad_line_is_right_or_fails(
-        data in data(), manner in manner(Just(true)), fates in fates(EVERYTHING)
+        data in data(), behaviour in behaviour(Just(true)), fates in fates(EVERYTHING)
     ) {
-        let (result, server) = download(&data, DownloadSize::Indicated, manner, Line::new(fates, true));
+        let (result, server) = download(&data, DownloadSize::Indicated, behaviour, Line::new(fates, true));
         if result.is_ok() {
             prop_assert!(server.object == data);
         } else {
@@ -258,10 +268,10 @@ proptest! {
 
     #[test]
     fn an_upload_over_a_bad_line_is_right_or_fails(
-        data in data(), manner in manner(Just(true)), block_size in 2..=127u8, fates in fates(EVERYTHING)
+        data in data(), behaviour in behaviour(Just(true)), block_size in 2..=127u8, fates in fates(EVERYTHING)
     ) {
-        prop_assume!(manner.announces || data.first() != Some(&0));
-        let (result, _) = upload(&data, block_size, manner, Line::new(fates, true));
+        prop_assume!(behaviour.announces || data.first() != Some(&0));
+        let (result, _) = upload(&data, block_size, behaviour, Line::new(fates, true));
         if let Ok(bytes) = result {
             prop_assert!(bytes == data);
         }
@@ -274,17 +284,17 @@ proptest! {
     ) {
         let data: Vec<u8> = (0..7 * segments).map(|at| (at % 251).to_le_bytes()[0]).collect();
         let lost = lost % (segments.min(127) - 1);
-        let manner = Manner { crc, announces: true, block_sizes: vec![127], hasty };
+        let behaviour = ServerBehaviour { crc, announces: true, block_sizes: vec![127], hasty };
         let fates = |before: usize| {
             let mut fates = vec![Fate::Arrives; before + lost];
             fates.push(Fate::Lost);
             fates
         };
         // The first segment follows two frames in a download and three in an upload.
-        let (result, server) = download(&data, DownloadSize::Indicated, manner.clone(), Line::new(fates(2), false));
+        let (result, server) = download(&data, DownloadSize::Indicated, behaviour.clone(), Line::new(fates(2), false));
         prop_assert_eq!(result, Ok(()));
         prop_assert!(server.object == data);
-        let (result, server) = upload(&data, 127, manner, Line::new(fates(3), false));
+        let (result, server) = upload(&data, 127, behaviour, Line::new(fates(3), false));
         prop_assert!(result == Ok(data));
         prop_assert!(server.is_idle());
     }

@@ -6,7 +6,7 @@ use cangauge::canopen::id::{CanId, NodeId};
 
 /// The behaviour of the server.
 #[derive(Clone, Debug)]
-pub(crate) struct Manner {
+pub(crate) struct ServerBehaviour {
     pub(crate) crc: bool,
     pub(crate) announces: bool,
     /// The block sizes of a download, used in turn.
@@ -42,22 +42,22 @@ enum State {
 pub(crate) struct Server {
     node: NodeId,
     pub(crate) object: Vec<u8>,
-    manner: Manner,
+    behaviour: ServerBehaviour,
     multiplexer: [u8; 3],
     state: State,
     block_sizes_given: usize,
 }
 
 impl Server {
-    pub(crate) fn new(node: NodeId, object: Vec<u8>, manner: Manner) -> Server {
-        Server { node, object, manner, multiplexer: [0; 3], state: State::Idle, block_sizes_given: 0 }
+    pub(crate) fn new(node: NodeId, object: Vec<u8>, behaviour: ServerBehaviour) -> Server {
+        Server { node, object, behaviour, multiplexer: [0; 3], state: State::Idle, block_sizes_given: 0 }
     }
 
     pub(crate) fn is_idle(&self) -> bool {
         self.state == State::Idle
     }
 
-    fn say(&self, bytes: [u8; 8]) -> Frame {
+    fn frame(&self, bytes: [u8; 8]) -> Frame {
         Frame::full(CanId::sdo_response(self.node), bytes)
     }
 
@@ -65,11 +65,11 @@ impl Server {
         self.state = State::Idle;
         let [a, b, c] = self.multiplexer;
         let [d, e, f, g] = code.to_le_bytes();
-        vec![self.say([0x80, a, b, c, d, e, f, g])]
+        vec![self.frame([0x80, a, b, c, d, e, f, g])]
     }
 
     fn next_block_size(&mut self) -> u8 {
-        let size = self.manner.block_sizes[self.block_sizes_given % self.manner.block_sizes.len()];
+        let size = self.behaviour.block_sizes[self.block_sizes_given % self.behaviour.block_sizes.len()];
         self.block_sizes_given += 1;
         size
     }
@@ -91,7 +91,7 @@ impl Server {
             }
             // A repeated segment of a complete sub-block.
             State::Taking { complete: true, .. } if bytes[0] & 0x7f >= 1 && bytes[0] & 0x60 != 0x40 => Vec::new(),
-            State::Offered { block_size } if bytes[0] == 0xa3 => self.give(0, block_size),
+            State::Offered { block_size } if bytes[0] == 0xa3 => self.send_block(0, block_size),
             State::Giving { start, count } if bytes[0] & 0xe3 == 0xa2 => {
                 let (taken, block_size) = (bytes[1], bytes[2]);
                 if taken > count {
@@ -101,13 +101,13 @@ impl Server {
                 if taken == count && next >= self.object.len() {
                     self.state = State::GaveAll;
                     let unused = u8::try_from(next - self.object.len()).unwrap();
-                    let [low, high] = if self.manner.crc { check_sum(&self.object).to_le_bytes() } else { [0, 0] };
-                    return vec![self.say([0xc1 | unused << 2, low, high, 0, 0, 0, 0, 0])];
+                    let [low, high] = if self.behaviour.crc { check_sum(&self.object).to_le_bytes() } else { [0, 0] };
+                    return vec![self.frame([0xc1 | unused << 2, low, high, 0, 0, 0, 0, 0])];
                 }
                 if !(1..=127).contains(&block_size) {
                     return self.abort(0x0504_0002);
                 }
-                self.give(next, block_size)
+                self.send_block(next, block_size)
             }
             State::GaveAll if bytes[0] & 0xe3 == 0xa1 => {
                 self.state = State::Idle;
@@ -120,7 +120,7 @@ impl Server {
     fn initiate(&mut self, bytes: [u8; 8]) -> Vec<Frame> {
         let [a, b, c] = [bytes[1], bytes[2], bytes[3]];
         self.multiplexer = [a, b, c];
-        let crc = u8::from(self.manner.crc) << 2;
+        let crc = u8::from(self.behaviour.crc) << 2;
         match bytes[0] & 0xe3 {
             // Bit 1 is reserved in an upload request, and the size bit in a download request.
             0xa0 => {
@@ -129,15 +129,15 @@ impl Server {
                 }
                 self.state = State::Offered { block_size: bytes[4] };
                 let size = u32::try_from(self.object.len()).unwrap();
-                let [d, e, f, g] = if self.manner.announces { size.to_le_bytes() } else { [0; 4] };
-                vec![self.say([0xc0 | crc | u8::from(self.manner.announces) << 1, a, b, c, d, e, f, g])]
+                let [d, e, f, g] = if self.behaviour.announces { size.to_le_bytes() } else { [0; 4] };
+                vec![self.frame([0xc0 | crc | u8::from(self.behaviour.announces) << 1, a, b, c, d, e, f, g])]
             }
             0xc0 | 0xc2 => {
                 let size = u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]);
                 let size = (bytes[0] & 2 != 0).then(|| usize::try_from(size).unwrap());
                 let block_size = self.next_block_size();
                 self.state = State::Taking { bytes: Vec::new(), size, sequence: 0, block_size, complete: false };
-                vec![self.say([0xa0 | crc, a, b, c, block_size, 0, 0, 0])]
+                vec![self.frame([0xa0 | crc, a, b, c, block_size, 0, 0, 0])]
             }
             _ => self.abort(0x0504_0001),
         }
@@ -159,11 +159,11 @@ impl Server {
             bytes.extend_from_slice(&frame[1..]);
             complete = frame[0] & 0x80 != 0;
         }
-        let over = number == block_size || frame[0] & 0x80 != 0 || self.manner.hasty && number > sequence;
+        let over = number == block_size || frame[0] & 0x80 != 0 || self.behaviour.hasty && number > sequence;
         let mut answer = Vec::new();
         if over {
             block_size = self.next_block_size();
-            answer.push(self.say([0xa2, sequence, block_size, 0, 0, 0, 0, 0]));
+            answer.push(self.frame([0xa2, sequence, block_size, 0, 0, 0, 0, 0]));
             sequence = 0;
         }
         self.state = State::Taking { bytes, size, sequence, block_size, complete };
@@ -176,15 +176,15 @@ impl Server {
         if size.is_some_and(|size| size != bytes.len()) {
             return self.abort(0x0607_0010);
         }
-        if self.manner.crc && check_sum(&bytes).to_le_bytes() != [frame[1], frame[2]] {
+        if self.behaviour.crc && check_sum(&bytes).to_le_bytes() != [frame[1], frame[2]] {
             return self.abort(0x0504_0004);
         }
         self.object = bytes;
         self.state = State::Idle;
-        vec![self.say([0xa1, 0, 0, 0, 0, 0, 0, 0])]
+        vec![self.frame([0xa1, 0, 0, 0, 0, 0, 0, 0])]
     }
 
-    fn give(&mut self, start: usize, block_size: u8) -> Vec<Frame> {
+    fn send_block(&mut self, start: usize, block_size: u8) -> Vec<Frame> {
         let mut parts: Vec<Vec<u8>> = self.object[start..].chunks(7).map(<[u8]>::to_vec).collect();
         if parts.is_empty() {
             parts.push(Vec::new());
@@ -199,7 +199,7 @@ impl Server {
                 let mut frame = [0u8; 8];
                 frame[0] = if usize::from(number) == all { 0x80 | number } else { number };
                 frame[1..=part.len()].copy_from_slice(&part);
-                self.say(frame)
+                self.frame(frame)
             })
             .collect()
     }

@@ -65,9 +65,9 @@ impl Station for Tap {
 }
 
 /// A device that ignores block requests.
-struct Deaf(Device);
+struct IgnoresBlocks(Device);
 
-impl Station for Deaf {
+impl Station for IgnoresBlocks {
     fn power_on(&mut self, now: Mono, out: &mut Outbox) {
         self.0.power_on(now, out);
     }
@@ -235,7 +235,7 @@ fn an_abort_about_the_object_is_not_retried() {
 
 #[test]
 fn a_device_that_ignores_blocks_is_read_in_segments() {
-    let mut bus = bus(250_000, [Deaf(device(5, true))]);
+    let mut bus = bus(250_000, [IgnoresBlocks(device(5, true))]);
     let start = bus.now().mono;
     assert_eq!(kind(&write(&mut bus, TEXT, &[b'x'; 40], BlockMode::Auto)), TransferKind::PlainFallback);
     let found = read(&mut bus, TEXT, Some(DataType::Domain), BlockMode::Auto);

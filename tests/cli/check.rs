@@ -88,7 +88,7 @@ fn units_are_found_in_another_case_and_c_means_degrees() {
 }
 
 #[test]
-fn an_unquoted_comparison_is_suspected() {
+fn unquoted_comparison_gets_a_hint() {
     let stderr = check(&constant(), &["5", "pressure"]).exit(2).stderr;
     assert!(
         stderr.ends_with("hint: the shell takes an unquoted > or < as a redirection; quote it: 'pressure > 5 bar'\n"),
@@ -198,7 +198,7 @@ fn an_invalid_sample_fails() {
 }
 
 #[test]
-fn missing_data_is_no_success() {
+fn missing_data_is_an_error() {
     let bench = constant();
     let done = check(&bench, &["9", "pressure < 3"]).exit(3);
     assert_eq!(done.stdout, "none  pressure < 3  no data: node 9: read 0x1000:0: no answer within 500 ms\n");

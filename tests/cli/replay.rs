@@ -152,7 +152,7 @@ fn tpdos_of_a_wrong_length_are_the_reason_for_no_rows() {
 }
 
 #[test]
-fn cut_answer_is_no_mapping() {
+fn truncated_answer_is_not_used_as_mapping() {
     let bench = Bench::of("mh4@5,dps@127");
     bench.run("log 5,127 --sync 20ms --duration 1s").exit(0);
     keep(&bench);

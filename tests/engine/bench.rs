@@ -4,7 +4,7 @@ use crate::carry_out::node;
 use crate::command::Command;
 use crate::kinds::{LARGE_KIND, LARGE_OBJECTS, filler, model};
 use crate::spec::{DeviceFault, DeviceSpec, Fault, Other, Spec};
-use crate::station::{Babbler, FaultyDevice, SecondMaster, write};
+use crate::station::{FaultyDevice, NoiseSender, SecondMaster, write};
 use cangauge::bus::Mono;
 use cangauge::bus::faults::FaultPlan;
 use cangauge::bus::memory::{BIT_RATE, Clock, MemoryBus};
@@ -136,7 +136,9 @@ pub(crate) fn bench(spec: &Spec, recorder: &Recorder) -> MemoryBus {
     for other in &spec.others {
         match other {
             Other::Master { plan } => bus.attach(SecondMaster::new(plan)),
-            Other::Babbler { every_us, seed, nasty } => bus.attach(Babbler::new(*every_us, *seed, *nasty)),
+            Other::NoiseSender { every_us, seed, uses_canopen_ids } => {
+                bus.attach(NoiseSender::new(*every_us, *seed, *uses_canopen_ids))
+            }
         }
     }
     bus

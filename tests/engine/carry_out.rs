@@ -2,8 +2,8 @@
 
 use crate::bench::identity;
 use crate::command::{Command, How, Measuring, Target};
-use crate::judge::group;
 use crate::kinds::model;
+use crate::rules::group;
 use crate::spec::Spec;
 use cangauge::bus::{Bus, Stamp};
 use cangauge::canopen::id::NodeId;
@@ -95,9 +95,9 @@ impl Observer for Observations {
 }
 
 /// A journal of a program that is not continued.
-struct Unkept;
+struct NoConfigJournal;
 
-impl config::Journal for Unkept {
+impl config::Journal for NoConfigJournal {
     fn begin(&mut self, _: &config::Snapshot) -> Result<(), Failure> {
         Ok(())
     }
@@ -300,7 +300,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             let before = config::read(master, node(*id), &none, Some(&config::File::Settings(document.clone())))?;
             // The file may contain settings that this device does not have.
             let Ok(file) = before.check(&document) else { return Ok(Claim::Nothing) };
-            config::apply(master, before, &file, &config::Options::default(), &none, &mut Unkept)?;
+            config::apply(master, before, &file, &config::Options::default(), &none, &mut NoConfigJournal)?;
             Claim::Configured(wanted)
         }
         Command::Autozero { node: id, channel, force, store, dry_run } => {

@@ -32,7 +32,7 @@ fn healthy(seed: u64) -> Spec {
             unsaved_heartbeat: None,
             overload: false,
             device_faults: Vec::new(),
-            oddity: None,
+            deviation: None,
             ..device.clone()
         };
     }

@@ -14,12 +14,12 @@
 mod bench;
 mod carry_out;
 mod command;
+mod deviation;
 mod healthy;
-mod judge;
 mod kinds;
 mod make;
-mod odd;
 mod random;
+mod rules;
 mod run;
 mod shrink;
 mod spec;
@@ -27,7 +27,7 @@ mod station;
 mod tap;
 mod time;
 
-use judge::{Violation, judge};
+use rules::{Violation, check_rules};
 use spec::Spec;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -36,10 +36,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// The number of scenarios of a plain `cargo test`.
-const FIXED: u64 = 400;
+const DEFAULT_SCENARIOS: u64 = 400;
 
 /// The test stops after this number of failures.
-const MOST: usize = 12;
+const MAX_FAILURES: usize = 12;
 
 fn env_number<T: std::str::FromStr>(name: &str) -> Option<T> {
     let text = std::env::var(name).ok()?;
@@ -52,14 +52,14 @@ fn print_line(text: &str) {
 }
 
 /// Runs a scenario. Returns the violated rules and the transcript.
-fn run_and_judge(spec: &Spec) -> (Vec<Violation>, String) {
+fn run_and_check(spec: &Spec) -> (Vec<Violation>, String) {
     let tried = catch_unwind(AssertUnwindSafe(|| {
         let mut run = run::run(spec);
         let end = format!("{:?} at {:?}\n", run.result, run.ended.since_start());
         let devices = run.bus.bus.inner().inner().stations::<station::FaultyDevice>();
         let devices: Vec<_> = devices.map(|station| bench::device_state(&station.device)).collect();
         let end = end + &format!("before {:?}\nafter {devices:?}", run.before);
-        let violations = judge(spec, &mut run);
+        let violations = check_rules(spec, &mut run);
         (violations, run::transcript(&run) + &end)
     }));
     tried.unwrap_or_else(|panic| {
@@ -72,7 +72,7 @@ fn run_and_judge(spec: &Spec) -> (Vec<Violation>, String) {
 /// Removes everything that is not needed to break the same rule.
 fn shrink(mut spec: Spec, rule: &str) -> Spec {
     loop {
-        let breaks = |smaller: &Spec| run_and_judge(smaller).0.iter().any(|(violations, _)| *violations == rule);
+        let breaks = |smaller: &Spec| run_and_check(smaller).0.iter().any(|(violations, _)| *violations == rule);
         match spec.smaller().into_iter().find(breaks) {
             Some(smaller) => spec = smaller,
             None => return spec,
@@ -87,7 +87,7 @@ fn report(seed: u64, violations: &[Violation], whole: bool) -> String {
     }
     if let (Some((rule, _)), true) = (violations.first(), whole) {
         let small = shrink(Spec::of(seed), rule);
-        let (violations, transcript) = run_and_judge(&small);
+        let (violations, transcript) = run_and_check(&small);
         text += &format!("  smallest: {small:#?}\n  {violations:?}\n{transcript}\n");
     }
     text
@@ -97,7 +97,7 @@ fn report(seed: u64, violations: &[Violation], whole: bool) -> String {
 fn no_rule_is_broken() {
     if let Some(seed) = env_number("ENGINE_SEED") {
         let spec = Spec::of(seed);
-        let (violations, transcript) = run_and_judge(&spec);
+        let (violations, transcript) = run_and_check(&spec);
         print_line(&format!("{spec:#?}\n{transcript}"));
         assert!(violations.is_empty(), "{}", report(seed, &violations, true));
         return;
@@ -105,7 +105,7 @@ fn no_rule_is_broken() {
     let (runs, seconds): (Option<u64>, Option<u64>) = (env_number("ENGINE_RUNS"), env_number("ENGINE_SECONDS"));
     let fresh = || SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |now| now.as_secs() << 24);
     let first = env_number("ENGINE_FROM").unwrap_or_else(|| if runs.or(seconds).is_some() { fresh() } else { 1 });
-    let most = runs.unwrap_or(if seconds.is_some() { u64::MAX } else { FIXED });
+    let most = runs.unwrap_or(if seconds.is_some() { u64::MAX } else { DEFAULT_SCENARIOS });
     let started = Instant::now();
     let until = seconds.map(|seconds| started + Duration::from_secs(seconds));
     let next = AtomicU64::new(0);
@@ -115,13 +115,13 @@ fn no_rule_is_broken() {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let enough =
-                failures.lock().expect("no thread panicked").len() >= env_number("ENGINE_MOST").unwrap_or(MOST);
+                failures.lock().expect("no thread panicked").len() >= env_number("ENGINE_MOST").unwrap_or(MAX_FAILURES);
             if number >= most || enough || until.is_some_and(|until| Instant::now() >= until) {
                 next.fetch_sub(1, Ordering::Relaxed);
                 return;
             }
             let seed = first.wrapping_add(number);
-            let (violations, _) = run_and_judge(&Spec::of(seed));
+            let (violations, _) = run_and_check(&Spec::of(seed));
             if !violations.is_empty() {
                 failures.lock().expect("no thread panicked").push((seed, violations));
             }

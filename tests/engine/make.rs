@@ -59,19 +59,19 @@ impl Spec {
         }
         // A quarter of the scenarios runs without any fault.
         match random.within(0..=99) {
-            0..=69 => spec.trouble(random),
+            0..=69 => spec.add_faults(random),
             70..=75 => spec.kill = Some(kill(random)),
             _ => {}
         }
         if random.percent(15) {
-            spec.make_odd(random);
-            // The rules for odd devices need the exact times of the bus.
+            spec.add_deviation(random);
+            // The rules for devices with a deviation need the exact times of the bus.
             spec.codec = None;
         }
         spec
     }
 
-    fn trouble(&mut self, random: &mut Random) {
+    fn add_faults(&mut self, random: &mut Random) {
         if random.percent(15) {
             self.faults = disturbed_wire(random);
         } else if random.percent(60) {
@@ -96,7 +96,11 @@ impl Spec {
         }
         if random.percent(10) {
             let every_us = *random.pick(&[600, 2_000, 10_000, 100_000]);
-            self.others.push(Other::Babbler { every_us, seed: random.next(), nasty: random.percent(30) });
+            self.others.push(Other::NoiseSender {
+                every_us,
+                seed: random.next(),
+                uses_canopen_ids: random.percent(30),
+            });
         }
         if random.percent(25) {
             self.interrupts.push(when(random));
@@ -128,7 +132,7 @@ fn device(random: &mut Random, at: u32) -> DeviceSpec {
         event_timer_ms: random.percent(30).then(|| *random.pick(&[10, 50, 100])),
         overload: random.percent(10),
         device_faults: Vec::new(),
-        oddity: None,
+        deviation: None,
     }
 }
 
@@ -204,7 +208,7 @@ fn device_fault(random: &mut Random) -> DeviceFault {
             *random.pick(&[60, 300, 700, 2_500, 4_000]),
         ),
         12 => DeviceFault::RefuseLss(*random.pick(&[0x11, 0x13, 0x17])),
-        13 => DeviceFault::Babbles {
+        13 => DeviceFault::SendsEmergencies {
             from_ms: when(random) / 1000,
             for_ms: *random.pick(&[20, 500, 10_000]),
             every_us: *random.pick(&[550, 2_000, 20_000]),

@@ -30,8 +30,8 @@ impl Spec {
             if device.event_timer_ms.is_some() {
                 without(&|spec| spec.devices[at].event_timer_ms = None);
             }
-            if device.oddity.is_some() {
-                without(&|spec| spec.devices[at].oddity = None);
+            if device.deviation.is_some() {
+                without(&|spec| spec.devices[at].deviation = None);
             }
             if device.overload {
                 without(&|spec| spec.devices[at].overload = false);

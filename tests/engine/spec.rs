@@ -2,7 +2,7 @@
 //! failing scenario can be reduced piece by piece.
 
 use crate::command::Command;
-use crate::odd::Oddity;
+use crate::deviation::Deviation;
 use cangauge::bus::coded::Codec;
 
 #[derive(Clone, Debug)]
@@ -44,7 +44,7 @@ pub(crate) struct DeviceSpec {
     pub(crate) event_timer_ms: Option<u16>,
     pub(crate) overload: bool,
     pub(crate) device_faults: Vec<DeviceFault>,
-    pub(crate) oddity: Option<Oddity>,
+    pub(crate) deviation: Option<Deviation>,
 }
 
 /// A fault of a device.
@@ -90,7 +90,7 @@ pub(crate) enum DeviceFault {
     EndlessFastscan,
     OfflineAfterReset,
     /// The device sends emergencies with an unknown code, periodically.
-    Babbles {
+    SendsEmergencies {
         from_ms: u64,
         for_ms: u64,
         every_us: u64,
@@ -103,7 +103,7 @@ pub(crate) enum Other {
     /// A second master: its frames with their moments in µs. It also requests the segments of strings.
     Master { plan: Vec<(u64, Act)> },
     /// Sends meaningless frames with this period in µs.
-    Babbler { every_us: u64, seed: u64, nasty: bool },
+    NoiseSender { every_us: u64, seed: u64, uses_canopen_ids: bool },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,9 +148,10 @@ impl Spec {
     /// Whether frames change on the way or are sent under a false identifier: values then prove nothing.
     pub(crate) fn falsifies_data(&self) -> bool {
         let faults = self.faults.iter().any(|fault| matches!(fault, Fault::Garble(..) | Fault::Truncate(..)));
-        let nasty = self.others.iter().any(|other| matches!(other, Other::Babbler { nasty: true, .. }));
+        let uses_canopen_ids =
+            self.others.iter().any(|other| matches!(other, Other::NoiseSender { uses_canopen_ids: true, .. }));
         faults
-            || nasty
+            || uses_canopen_ids
             || self
                 .device_faults()
                 .any(|device_fault| matches!(device_fault, DeviceFault::Garbled { .. } | DeviceFault::As { .. }))
@@ -165,7 +166,7 @@ impl Spec {
             .iter()
             .flat_map(|other| match other {
                 Other::Master { plan } => plan.as_slice(),
-                Other::Babbler { .. } => &[],
+                Other::NoiseSender { .. } => &[],
             })
             .map(|(_, act)| act)
     }
@@ -208,11 +209,11 @@ impl Spec {
             && self
                 .devices
                 .iter()
-                .all(|device| device.bit_rate.is_none() && device.latency_us < 20_000 && device.oddity.is_none())
+                .all(|device| device.bit_rate.is_none() && device.latency_us < 20_000 && device.deviation.is_none())
     }
 
     /// Whether all faults are between the program and the bus.
-    pub(crate) fn is_clean_but_for_faults(&self) -> bool {
+    pub(crate) fn has_only_bus_faults(&self) -> bool {
         Spec { faults: Vec::new(), interrupts: Vec::new(), kill: None, ..self.clone() }.is_clean()
     }
 }

@@ -1,6 +1,6 @@
 //! The participants on the bus: devices with faults, which record the frames they sent, and other participants.
 
-use crate::odd::{Oddity, TpdoFault};
+use crate::deviation::{Deviation, TpdoFault};
 use crate::random::Random;
 use crate::spec::{Act, DeviceFault, DeviceSpec};
 use cangauge::bus::Mono;
@@ -23,10 +23,10 @@ pub(crate) struct FaultyDevice {
     /// Its place on the bench.
     pub(crate) place: usize,
     device_faults: Vec<DeviceFault>,
-    oddity: Option<Oddity>,
-    /// Whether it has its oddity: a device may reject the setting.
-    pub(crate) has_oddity: bool,
-    /// The lengths of frames before the oddity changed them.
+    deviation: Option<Deviation>,
+    /// Whether it has its deviation: a device may reject the setting.
+    pub(crate) has_deviation: bool,
+    /// The lengths of frames before the deviation changed them.
     lengths: BTreeMap<CanId, usize>,
     resets: VecDeque<Mono>,
     hangs: Vec<(Mono, Mono)>,
@@ -36,7 +36,7 @@ pub(crate) struct FaultyDevice {
     answers: u64,
     late: Vec<(Mono, Frame)>,
     /// The next emergency without meaning, the end of the series, and its period.
-    babble: Option<(Mono, Mono, Duration)>,
+    unknown_emergencies: Option<(Mono, Mono, Duration)>,
     unsaved: Option<Frame>,
     /// Every frame that it sent, with the moment of its end.
     pub(crate) sent: Vec<(Mono, Frame)>,
@@ -51,13 +51,13 @@ impl FaultyDevice {
     pub(crate) fn new(device: Device, place: usize, spec: &DeviceSpec, unsaved: Option<Frame>) -> FaultyDevice {
         let mut resets: Vec<Mono> = Vec::new();
         let mut hangs = Vec::new();
-        let mut babble = None;
+        let mut unknown_emergencies = None;
         for device_fault in &spec.device_faults {
             match device_fault {
                 DeviceFault::ResetAt { ms: at } => resets.push(ms(*at)),
                 DeviceFault::Hang { from_ms, for_ms } => hangs.push((ms(*from_ms), ms(from_ms + for_ms))),
-                DeviceFault::Babbles { from_ms, for_ms, every_us } => {
-                    babble = Some((ms(*from_ms), ms(from_ms + for_ms), Duration::from_micros(*every_us)));
+                DeviceFault::SendsEmergencies { from_ms, for_ms, every_us } => {
+                    unknown_emergencies = Some((ms(*from_ms), ms(from_ms + for_ms), Duration::from_micros(*every_us)));
                 }
                 _ => {}
             }
@@ -67,15 +67,15 @@ impl FaultyDevice {
             device,
             place,
             device_faults: spec.device_faults.clone(),
-            oddity: spec.oddity,
-            has_oddity: true,
+            deviation: spec.deviation,
+            has_deviation: true,
             lengths: BTreeMap::new(),
             resets: resets.into(),
             hangs,
             hung_until: Mono::START,
             answers: 0,
             late: Vec::new(),
-            babble,
+            unknown_emergencies,
             unsaved,
             sent: Vec::new(),
             signed: Vec::new(),
@@ -85,20 +85,20 @@ impl FaultyDevice {
     }
 
     /// Removes all faults.
-    pub(crate) fn tame(&mut self) {
+    pub(crate) fn remove_faults(&mut self) {
         self.device_faults.clear();
-        self.oddity = None;
+        self.deviation = None;
         self.resets.clear();
         self.hangs.clear();
         self.late.clear();
-        self.babble = None;
+        self.unknown_emergencies = None;
         self.hung_until = Mono::START;
     }
 
     /// Sends an emergency with an unknown code, if one is due and the previous one was sent.
-    fn babble(&mut self, now: Mono, out: &mut Outbox) {
-        let Some((due, until, every)) = self.babble.filter(|(due, ..)| *due <= now) else { return };
-        self.babble = (due < until).then_some((now + every, until, every));
+    fn send_unknown_emergency(&mut self, now: Mono, out: &mut Outbox) {
+        let Some((due, until, every)) = self.unknown_emergencies.filter(|(due, ..)| *due <= now) else { return };
+        self.unknown_emergencies = (due < until).then_some((now + every, until, every));
         if let (Some(node), Some(_), None) = (self.device.node(), self.device.state(), out.front()) {
             out.send(Frame::full(CanId::emergency(node), [0xff, 0xff, 0, 0, 0, 0, 0, 0]));
         }
@@ -129,7 +129,7 @@ impl FaultyDevice {
         let before = answers(out);
         act(&mut self.device, out);
         let mut old = answers(out).min(before);
-        if answers(out) > old && (!self.device_faults.is_empty() || self.oddity == Some(Oddity::Twice)) {
+        if answers(out) > old && (!self.device_faults.is_empty() || self.deviation == Some(Deviation::Twice)) {
             let all: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
             for frame in all {
                 let is_answer = frame.id().sdo_response_node().is_some();
@@ -141,10 +141,10 @@ impl FaultyDevice {
                 }
             }
         }
-        if let Some(oddity) = self.oddity {
+        if let Some(deviation) = self.deviation {
             let all: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
-            for frame in all.into_iter().filter(|frame| !oddity.drops(frame)) {
-                let changed = oddity.changed(frame);
+            for frame in all.into_iter().filter(|frame| !deviation.drops(frame)) {
+                let changed = deviation.changed(frame);
                 if changed != frame {
                     self.lengths.insert(frame.id(), frame.data().len());
                 }
@@ -157,7 +157,7 @@ impl FaultyDevice {
     fn answer(&mut self, mut frame: Frame, now: Mono, out: &mut Outbox) {
         let number = self.answers;
         self.answers += 1;
-        let (mut copies, mut late) = (if self.oddity == Some(Oddity::Twice) { 2 } else { 1 }, None);
+        let (mut copies, mut late) = (if self.deviation == Some(Deviation::Twice) { 2 } else { 1 }, None);
         for device_fault in &self.device_faults {
             match *device_fault {
                 DeviceFault::Lose { nth } if nth == number => copies = 0,
@@ -208,13 +208,13 @@ impl Station for FaultyDevice {
             let mut nowhere = Outbox::default();
             self.device.receive(now, &write, &mut nowhere);
         }
-        if let Some(oddity) = self.oddity {
-            self.has_oddity = oddity.power_on(&mut self.device, now);
+        if let Some(deviation) = self.deviation {
+            self.has_deviation = deviation.power_on(&mut self.device, now);
         }
     }
 
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
-        if self.hung_until(now).is_some() || self.oddity.is_some_and(|oddity| oddity.ignores(frame)) {
+        if self.hung_until(now).is_some() || self.deviation.is_some_and(|deviation| deviation.ignores(frame)) {
             return;
         }
         if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight())
@@ -228,14 +228,14 @@ impl Station for FaultyDevice {
             Some(refusal) if self.device.state().is_some_and(|state| state != State::Stopped) => out.send(refusal),
             _ => self.act(now, out, |device, out| device.receive(now, frame, out)),
         }
-        if let (Some(oddity), Some(node), Some(State::Operational), CanId::NMT) =
-            (self.oddity, self.device.node(), self.device.state(), frame.id())
+        if let (Some(deviation), Some(node), Some(State::Operational), CanId::NMT) =
+            (self.deviation, self.device.node(), self.device.state(), frame.id())
         {
-            if matches!(oddity, Oddity::NoTpdo(TpdoFault::Offline | TpdoFault::OfflineWithoutHeartbeat)) {
+            if matches!(deviation, Deviation::NoTpdo(TpdoFault::Offline | TpdoFault::OfflineWithoutHeartbeat)) {
                 out.clear();
                 self.hangs.push((now, ms(1_000_000)));
             }
-            let Some((command, emergency)) = oddity.own_command(node) else { return };
+            let Some((command, emergency)) = deviation.own_command(node) else { return };
             self.act(now, out, |device, out| device.receive(now, &command, out));
             emergency.into_iter().for_each(|frame| out.send(frame));
         }
@@ -252,7 +252,7 @@ impl Station for FaultyDevice {
             self.hung_until = until;
             return;
         }
-        self.babble(now, out);
+        self.send_unknown_emergency(now, out);
         for (_, frame) in self.late.extract_if(.., |(due, _)| *due <= now) {
             out.send(frame);
         }
@@ -264,8 +264,9 @@ impl Station for FaultyDevice {
     fn next_wake(&self) -> Option<Mono> {
         let late = self.late.iter().map(|(due, _)| *due);
         // A device that hangs is not woken before the end.
-        let babble = self.babble.map(|(due, ..)| due);
-        let own = late.chain(self.device.next_wake()).chain(babble).min().map(|due| due.max(self.hung_until));
+        let unknown_emergencies = self.unknown_emergencies.map(|(due, ..)| due);
+        let own =
+            late.chain(self.device.next_wake()).chain(unknown_emergencies).min().map(|due| due.max(self.hung_until));
         own.into_iter().chain(self.resets.front().copied()).min()
     }
 
@@ -273,7 +274,7 @@ impl Station for FaultyDevice {
         self.sent.push((now, *frame));
         // The simulated device records only frames of its own lengths.
         let own = self.lengths.get(&frame.id()).and_then(|length| frame.data().get(..*length));
-        let own = own.filter(|_| matches!(self.oddity, Some(Oddity::Pdo(_))));
+        let own = own.filter(|_| matches!(self.deviation, Some(Deviation::Pdo(_))));
         let own = own.and_then(|data| Frame::new(frame.id(), data).ok());
         self.device.sent(now, &own.unwrap_or(*frame));
     }
@@ -355,21 +356,26 @@ impl Station for SecondMaster {
     fn sent(&mut self, _: Mono, _: &Frame) {}
 }
 
-/// Sends meaningless frames. A `nasty` one uses identifiers of CANopen services.
-pub(crate) struct Babbler {
+/// Sends meaningless frames. A `uses_canopen_ids` one uses identifiers of CANopen services.
+pub(crate) struct NoiseSender {
     every: Duration,
     next: Mono,
     random: Random,
-    nasty: bool,
+    uses_canopen_ids: bool,
 }
 
-impl Babbler {
-    pub(crate) fn new(every_us: u64, seed: u64, nasty: bool) -> Babbler {
-        Babbler { every: Duration::from_micros(every_us), next: Mono::START, random: Random::new(seed), nasty }
+impl NoiseSender {
+    pub(crate) fn new(every_us: u64, seed: u64, uses_canopen_ids: bool) -> NoiseSender {
+        NoiseSender {
+            every: Duration::from_micros(every_us),
+            next: Mono::START,
+            random: Random::new(seed),
+            uses_canopen_ids,
+        }
     }
 }
 
-impl Station for Babbler {
+impl Station for NoiseSender {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
@@ -382,7 +388,7 @@ impl Station for Babbler {
         let random = &mut self.random;
         let node = u16::from(random.byte(1..=127));
         let (id, least) = match random.within(0..=7) {
-            _ if !self.nasty => (*random.pick(&[0x7ff, 0x010, 0x7f0, 0x679]), 0),
+            _ if !self.uses_canopen_ids => (*random.pick(&[0x7ff, 0x010, 0x7f0, 0x679]), 0),
             0 => (0x080 + node, 8),
             // The program would accept a frame that looks like an acknowledgement, so its first byte is changed below.
             1..=3 => (0x580 + node, 0),
@@ -398,7 +404,7 @@ impl Station for Babbler {
         if id == 0x7e4 && data.first().is_some_and(|first| *first < 0x80) {
             data[0] = 0xf0;
         }
-        let id = if random.percent(10) && !self.nasty {
+        let id = if random.percent(10) && !self.uses_canopen_ids {
             CanId::extended(0x1800_0000 + u32::from(id))
         } else {
             CanId::standard(id)

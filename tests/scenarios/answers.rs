@@ -101,7 +101,7 @@ fn object_with_a_stale_request_is_not_used_for_the_barrier_read() {
 }
 
 #[test]
-fn write_behind_a_failed_barrier_read_is_not_reported_as_sent() {
+fn failed_barrier_read_is_reported_instead_of_the_write() {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
     bus.attach(Slow::new(&[250]));
     let mut bus = Faulty::new(bus, FaultPlan { lose_sent: [1].into(), ..FaultPlan::default() });
@@ -132,7 +132,7 @@ fn barrier_read_is_repeated_like_any_read() {
 }
 
 #[test]
-fn silent_server_is_no_answer_after_every_read() {
+fn every_read_of_a_silent_server_fails() {
     assert_eq!(reads(&[0x2000, 0x2000], 1, &[10_000]), [None, None]);
 }
 
@@ -164,7 +164,7 @@ impl Station for TwoClientServer {
 }
 
 #[test]
-fn acknowledgement_for_another_client_is_no_success() {
+fn acknowledgement_for_another_client_is_ambiguous() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(TwoClientServer { ours: false });
     let mut master = Master::new(&mut bus, Timing::default());

@@ -52,9 +52,9 @@ const DEVICES: [(&str, &str); 4] = [
 
 /// A journal that outlives its program: the text of the old settings.
 #[derive(Default)]
-struct Kept(Option<String>);
+struct KeptJournal(Option<String>);
 
-impl Journal for Kept {
+impl Journal for KeptJournal {
     fn begin(&mut self, before: &Snapshot) -> Result<(), Failure> {
         self.0.get_or_insert_with(|| text(before));
         Ok(())
@@ -104,7 +104,7 @@ fn dump(bus: &mut dyn Bus, number: u8) -> String {
 }
 
 fn set(bus: &mut dyn Bus, number: u8, file: &str, options: &Options) -> Result<Applied, Failure> {
-    set_with(bus, number, file, options, &mut Kept::default())
+    set_with(bus, number, file, options, &mut KeptJournal::default())
 }
 
 fn set_with(
@@ -112,7 +112,7 @@ fn set_with(
     number: u8,
     file: &str,
     options: &Options,
-    journal: &mut Kept,
+    journal: &mut KeptJournal,
 ) -> Result<Applied, Failure> {
     let mut document = Document::parse(file).expect("TOML");
     if let Some(before) = &journal.0 {
@@ -231,7 +231,7 @@ fn a_killed_apply_is_completed_or_rolled_back() {
                 let case = format!("{device} killed before {at}: {frame}");
                 // The MH-4 has every kind of setting. The other devices alternate.
                 for rolls_back in [false, true].into_iter().filter(|back| device == "mh4" || *back == (at % 2 == 0)) {
-                    let mut journal = Kept::default();
+                    let mut journal = KeptJournal::default();
                     let mut killed = FaultyBus::new(bus(device), Fault::Gone, at);
                     set_with(&mut killed, NODE, file, &options, &mut journal).expect_err(&case);
                     let mut bus = killed.bus;

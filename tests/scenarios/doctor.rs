@@ -40,7 +40,7 @@ impl Case {
         Case::of(&format!("[[device]]\nkind = \"mh4\"\nnode = 5\nstart = true\nset = {{ {} }}\n", set.join(", ")))
     }
 
-    fn hears(self, others: &[(u64, &'static str)]) -> Case {
+    fn with_other_frames(self, others: &[(u64, &'static str)]) -> Case {
         Case { others: others.to_vec(), ..self }
     }
 
@@ -104,11 +104,19 @@ fn each_fault_has_its_finding() {
         ("another node only", sending("").node(9), &["9 absent"]),
         ("no node-ID", Case { lss: true, ..Case::of("[[device]]\nkind = \"mh4\"\n") }, &["unconfigured"]),
         ("no node-ID, without LSS", Case::of("[[device]]\nkind = \"mh4\"\n"), &["no-frame"]),
-        ("frames of no CANopen node", Case::of("").hears(&[(1000, "7E0#01"), (1500, "7E0#01")]), &["no-node"]),
-        ("stopped", sending("\"0x1017\" = 100").hears(&[(5, "000#0205")]), &["5 stopped"]),
+        (
+            "frames of no CANopen node",
+            Case::of("").with_other_frames(&[(1000, "7E0#01"), (1500, "7E0#01")]),
+            &["no-node"],
+        ),
+        ("stopped", sending("\"0x1017\" = 100").with_other_frames(&[(5, "000#0205")]), &["5 stopped"]),
         ("pre-operational", Case::of("[[device]]\nkind = \"d20\"\nnode = 5\n"), &["5 not-operational"]),
-        ("pre-operational by heartbeat", sending("\"0x1017\" = 100").hears(&[(5, "000#8005")]), &["5 not-operational"]),
-        ("no power after a reset", Case::of(offline).hears(&[(1000, "000#8105")]), &["5 unreachable"]),
+        (
+            "pre-operational by heartbeat",
+            sending("\"0x1017\" = 100").with_other_frames(&[(5, "000#8005")]),
+            &["5 not-operational"],
+        ),
+        ("no power after a reset", Case::of(offline).with_other_frames(&[(1000, "000#8105")]), &["5 unreachable"]),
         ("disabled", sending("\"0x1800:1\" = 0xC0000185, \"0x1801:1\" = 0xC0000285"), &["5 tpdo-disabled"]),
         ("waits for SYNC", sending(&format!("\"0x1800:2\" = 1, {silent}")), &["5 waits-for-sync"]),
         ("on request only", sending(&format!("\"0x1800:2\" = 253, {silent}")), &["5 only-on-request"]),
@@ -146,15 +154,15 @@ fn each_fault_has_its_finding() {
             &["bus-errors", "5 pressure shared-cob-id", "6 pressure shared-cob-id"],
         ),
         ("two devices with one node-ID", Case::of(&(twin(11) + &twin(22))), &["5 unexpected"]),
-        ("answers on another channel", Case::of("").hears(&other_channel).node(5), &["5 no-answer"]),
+        ("answers on another channel", Case::of("").with_other_frames(&other_channel).node(5), &["5 no-answer"]),
         (
             "wrong length",
-            sending(&format!("\"0x1800:5\" = 0, \"0x1800:2\" = 1, {silent}")).hears(&[(1000, "185#0102")]),
+            sending(&format!("\"0x1800:5\" = 0, \"0x1800:2\" = 1, {silent}")).with_other_frames(&[(1000, "185#0102")]),
             &["5 wrong-length"],
         ),
         (
             "passive, pre-operational",
-            Case { passive: true, ..sending("\"0x1017\" = 100").hears(&[(5, "000#8005")]) },
+            Case { passive: true, ..sending("\"0x1017\" = 100").with_other_frames(&[(5, "000#8005")]) },
             &["5 not-operational"],
         ),
         ("passive, no frame", Case { passive: true, ..Case::of("") }, &["no-frame"]),

@@ -1,6 +1,6 @@
 //! Frames of every function code and length during a recording: they change no row and do not end it.
 
-use super::Kept;
+use super::RecordedRows;
 use cangauge::bus::memory::{Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
@@ -87,7 +87,7 @@ impl Station for GarbageSender {
 }
 
 #[test]
-fn garbage_changes_no_row_and_ends_no_recording() {
+fn garbage_does_not_change_rows_or_end_the_recording() {
     for mode in [Mode::Sync(Duration::from_millis(10)), Mode::AsSent] {
         let folder = tempfile::tempdir().expect("a folder");
         let mut bus = Bench::from_toml(BENCH, folder.path()).expect("a bench").open().expect("a bus");
@@ -103,7 +103,7 @@ fn garbage_changes_no_row_and_ends_no_recording() {
             max_gap: None,
             overrides: BTreeMap::new(),
         };
-        let mut kept = Kept::default();
+        let mut kept = RecordedRows::default();
         let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
         let garbage_frames = bus.stations::<GarbageSender>().next().expect("the sender").sent;
         assert!(garbage_frames > 10_000, "{garbage_frames} frames in 4 s, each at least three times");

@@ -1,7 +1,7 @@
 //! A recording continues by itself after changes of nodes, mapping and interface. Each row is decoded with the mapping,
 //! unit and decimal digits that the device had when it sent the frame.
 
-use super::Kept;
+use super::RecordedRows;
 use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
 use cangauge::bus::time::{Mono, Stamp};
@@ -62,7 +62,7 @@ impl Station for Other {
 
 /// A recording, and the simulator's record of the sent values.
 struct Run {
-    kept: Kept,
+    kept: RecordedRows,
     outcome: RecordingReport,
     /// The lines of the simulator from the first row to the last.
     sent: Vec<String>,
@@ -112,7 +112,7 @@ fn record(devices: &str, mode: Mode, others: &[(u64, &str)], before: &dyn Fn(&mu
     bus.attach(Other::new(others));
     bus.attach(NmtRecorder::default());
     before(&mut Master::new(&mut bus, Timing::default()));
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(mode), &mut kept).expect("a recording");
     let commands = bus.stations::<NmtRecorder>().flat_map(|ear| ear.commands.clone()).collect();
     drop(bus);
@@ -202,7 +202,7 @@ fn lost_return_to_the_previous_state_is_noticed() {
         let mut bus = Bench::from_toml(&devices, Path::new("")).expect("a bench").open().expect("a bus");
         bus.attach(NmtRecorder::default());
         let plan = FaultPlan { lose_sent: lost.iter().copied().collect(), ..FaultPlan::default() };
-        let (mut bus, mut kept) = (Faulty::new(bus, plan), Kept::default());
+        let (mut bus, mut kept) = (Faulty::new(bus, plan), RecordedRows::default());
         let outcome = log(&mut Master::new(&mut bus, Timing::default()), &self::plan(Mode::AsSent), &mut kept);
         let remarks = outcome.expect("a recording").remarks;
         let is_reported = remarks.iter().any(|remark| matches!(remark, Remark::StatesNotRestored(_)));
@@ -229,7 +229,7 @@ fn restarted_node_is_read_again_until_it_answers_completely() {
         is_vendor && (at(2000)..at(4000)).contains(&received.at.mono)
     };
     let mut bus = UnstableBus { is_lost, ..UnstableBus::new(inner, &[]) };
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(Mode::AsSent), &mut kept);
     let mut signals: Vec<&str> = kept.rows.iter().filter_map(|row| row.split(',').nth(2)).collect();
     signals.dedup();
@@ -315,7 +315,7 @@ fn unit_changed_by_another_master() {
 }
 
 #[test]
-fn wrong_length_makes_the_node_read_again() {
+fn node_is_read_again_after_a_wrong_length() {
     // The frame is shorter than the mapping. The node is read again once; nothing has changed.
     let others = [(2000, "185#01"), (2200, "185#01"), (2400, "185#01")];
     let run = record(MH4, SYNC, &others, &nothing);
@@ -334,7 +334,7 @@ fn passive_recording_uses_no_old_mapping() {
     bus.attach(Other::new(&[(100, "000#0105"), (1000, unit), (2000, "000#8105"), (2500, "000#0105")]));
     let dps = catalog::by_name("dps").expect("a description");
     let plan = LogOptions { overrides: [(node(5), dps)].into(), ..plan(Mode::Passive) };
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
     drop(bus);
     let truth = std::fs::read_to_string(folder.path().join("truth.csv")).expect("the record");
@@ -357,7 +357,7 @@ fn lost_heartbeat_and_changed_state_are_reported() {
         received.frame.id() == CanId::heartbeat(node(5)) && (at(2000)..at(3000)).contains(&received.at.mono)
     };
     let mut bus = UnstableBus { is_lost, ..UnstableBus::new(inner, &[]) };
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(SYNC), &mut kept).expect("a recording");
     let lost = kept
         .notes
@@ -426,7 +426,7 @@ impl Bus for UnstableBus {
 }
 
 /// Records with interface events. The node restarts at 2.2 s, and its boot-up is lost.
-fn record_with_events(events: &[(u64, Event)]) -> (Kept, RecordingReport) {
+fn record_with_events(events: &[(u64, Event)]) -> (RecordedRows, RecordingReport) {
     let text = format!("clock = \"virtual\"\n{DPS}");
     let mut inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
     inner.attach(Other::new(&[(2200, "000#8105")]));
@@ -435,7 +435,7 @@ fn record_with_events(events: &[(u64, Event)]) -> (Kept, RecordingReport) {
         received.frame.id() == CanId::heartbeat(node(5)) && (at(2100)..at(2400)).contains(&received.at.mono)
     };
     let mut bus = UnstableBus { is_lost, ..UnstableBus::new(inner, events) };
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(Mode::AsSent), &mut kept);
     (kept, outcome.expect("a recording"))
 }
@@ -479,7 +479,7 @@ fn sixteen_nodes_are_polled_in_parallel() {
     let mut bus = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
     let mut plan = plan(Mode::Poll(Duration::from_millis(100)));
     plan.nodes = (1..=16).map(node).collect();
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
     assert_eq!(outcome.skipped, 0);
     assert_eq!(outcome.statistics.len(), 32, "pressure and temperature of each");
@@ -500,7 +500,7 @@ fn sync_delays_are_measured() {
     let text = format!("clock = \"virtual\"\n{MH4}");
     let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
     let mut bus = UnstableBus::new(inner, &[(2000, Event::Link(false)), (3000, Event::Link(true))]);
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(SYNC), &mut kept).expect("a recording");
     assert_eq!(outcome.syncs.sent + outcome.syncs.left_out, SECONDS * 100);
     assert!((99..=101).contains(&outcome.syncs.left_out), "{:?}", outcome.syncs.left_out);
@@ -513,7 +513,7 @@ fn longer_intervals_than_max_gap_are_gaps() {
         let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
         let mut bus = UnstableBus::new(inner, &[(2000, Event::Link(false)), (2120, Event::Link(true))]);
         let plan = LogOptions { max_gap: Some(Duration::from_millis(longest)), ..plan(SYNC) };
-        let mut kept = Kept::default();
+        let mut kept = RecordedRows::default();
         let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
         assert_eq!(outcome.gaps, gaps, "{longest}");
         assert_eq!(outcome.statistics[0].1.gaps(), gaps);

@@ -31,12 +31,12 @@ use std::ops::ControlFlow;
 
 /// Keeps the rows and events of a recording, in the format of the simulator's record.
 #[derive(Default)]
-struct Kept {
+struct RecordedRows {
     rows: Vec<String>,
     notes: Vec<LogEvent>,
 }
 
-impl Observer for Kept {
+impl Observer for RecordedRows {
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
         for sample in samples {
             let source = &sources[sample.source];

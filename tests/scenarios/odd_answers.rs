@@ -1,6 +1,6 @@
 //! Answers of the wrong length, and more than one answer to a request.
 
-use super::Kept;
+use super::RecordedRows;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
@@ -65,7 +65,7 @@ impl Station for PartlySilent {
 }
 
 /// Runs `work` with a device that does not answer for some objects.
-fn with_mute<T>(kind: &str, silent: &[u16], work: impl FnOnce(&mut Master<'_>) -> T) -> T {
+fn with_partly_silent<T>(kind: &str, silent: &[u16], work: impl FnOnce(&mut Master<'_>) -> T) -> T {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
     bus.attach(PartlySilent::new(kind, silent));
     work(&mut Master::new(&mut bus, Timing::default()))
@@ -141,7 +141,7 @@ fn shorter_than_announced_is_accepted_if_read_twice_alike() {
 }
 
 #[test]
-fn other_bytes_in_the_second_read_are_no_value() {
+fn different_bytes_in_the_second_read_are_an_error() {
     for (first, second) in [(ABC, &["585#0941424400000000"] as &[&str]), (&["585#0741424344000000"], ABC)] {
         let steps: [Step; 3] = [(ASK_NAME, &["585#4108100064000000"]), (FIRST, first), (FIRST, second)];
         let error = read(&steps, Request::read(node(), NAME)).expect_err("the bytes differ");
@@ -227,7 +227,7 @@ fn duplicate_answers_are_ignored() {
 }
 
 #[test]
-fn two_devices_get_no_write() {
+fn nothing_is_written_if_two_devices_answer() {
     // The first request of the command is the write; the serial numbers are compared before it.
     let steps: [Step; 2] = [("605#40181004", TWO_SERIALS), (WRITES, ACKNOWLEDGED_TWICE)];
     with(&steps, |master| {
@@ -278,7 +278,7 @@ fn identity_with(odd: &[Step]) -> Result<Vec<Node>, Error> {
 }
 
 #[test]
-fn silent_object_stops_no_survey() {
+fn silent_object_does_not_stop_the_survey() {
     for silent in [
         &[0x1000][..],
         &[0x1017, 0x1014, 0x1005, 0x1019],
@@ -288,7 +288,7 @@ fn silent_object_stops_no_survey() {
         &[0x1A00],
     ] {
         for kind in ["mh4", "dps"] {
-            let (node, unknown) = with_mute(kind, silent, |master| {
+            let (node, unknown) = with_partly_silent(kind, silent, |master| {
                 let surveyed = survey_each(master, &[node()], &Overrides::new()).expect("the bus works").remove(0);
                 (surveyed.unwrap_or_else(|error| panic!("{kind} {silent:x?}: {error}")), master.unknown_objects())
             });
@@ -303,7 +303,7 @@ fn silent_object_stops_no_survey() {
 #[test]
 fn node_that_answers_only_its_device_type_is_given_up_soon() {
     let silent: Vec<u16> = (0x1001..=0x9fff).collect();
-    with_mute("mh4", &silent, |master| {
+    with_partly_silent("mh4", &silent, |master| {
         let error = survey_each(master, &[node()], &Overrides::new()).expect("the bus works").remove(0);
         assert!(matches!(error, Err(SdoError { failure: SdoFailure::NoAnswer { .. }, .. })), "{error:?}");
         assert!(master.now().since_start() < Duration::from_secs(10), "{:?}", master.now().since_start());
@@ -312,7 +312,7 @@ fn node_that_answers_only_its_device_type_is_given_up_soon() {
 
 /// The readings of an MH-4.
 fn readings(kind: &str, silent: &[u16]) -> Result<Readings, Failure> {
-    with_mute(kind, silent, |master| {
+    with_partly_silent(kind, silent, |master| {
         read_signals(master, &[node()], &[], &Overrides::new()).expect("the bus works").remove(0)
     })
 }
@@ -347,8 +347,8 @@ fn polling() -> LogOptions {
 fn silent_status_object_does_not_slow_polling_down() {
     for (kind, silent, signals) in [("mh4", &[0x6150][..], 2), ("dps", &[0x1001], 1)] {
         let options = polling();
-        let mut kept = Kept::default();
-        with_mute(kind, silent, |master| log(master, &options, &mut kept)).expect("the values answer");
+        let mut kept = RecordedRows::default();
+        with_partly_silent(kind, silent, |master| log(master, &options, &mut kept)).expect("the values answer");
         assert!(kept.rows.len() > 75 * signals, "{kind}: {}", kept.rows.len());
         assert!(kept.rows.iter().all(|row| !row.contains(",ok,")), "{kind}: {:?}", kept.rows);
     }
@@ -367,7 +367,7 @@ fn pages_show_the_objects_that_answer() {
         assert_eq!(master.unknown_objects()[&node()], [timer], "{kind}");
     }
     for (silent, register) in [(0x1003, Some(0)), (0x1001, None)] {
-        with_mute("mh4", &[silent], |master| {
+        with_partly_silent("mh4", &[silent], |master| {
             let device = settings::open(master, node(), &Overrides::new()).expect("answers");
             let errors = settings::errors::read(master, &device).expect("the other object answers");
             assert_eq!((errors.register, errors.count.is_some()), (register, silent == 0x1001));
@@ -375,7 +375,7 @@ fn pages_show_the_objects_that_answer() {
             assert!(settings::info::read(master, node(), &Overrides::new()).is_ok());
         });
     }
-    with_mute("dps", &[0x1001, 0x1003], |master| {
+    with_partly_silent("dps", &[0x1001, 0x1003], |master| {
         let device = settings::open(master, node(), &Overrides::new()).expect("answers");
         let failure = settings::errors::read(master, &device).expect_err("neither answers");
         assert_eq!(failure.kind(), Kind::NoAnswer);
@@ -385,9 +385,9 @@ fn pages_show_the_objects_that_answer() {
 }
 
 /// A second device with the node-ID: from this moment it answers reads of the pressure with another value.
-struct Joins(Mono);
+struct JoiningDevice(Mono);
 
-impl Station for Joins {
+impl Station for JoiningDevice {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
@@ -409,9 +409,9 @@ impl Station for Joins {
 fn second_device_that_joins_ends_polling() {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
     bus.attach(PartlySilent::new("mh4", &[]));
-    bus.attach(Joins(Mono::START + Duration::from_secs(2)));
+    bus.attach(JoiningDevice(Mono::START + Duration::from_secs(2)));
     let options = LogOptions { duration: None, ..polling() };
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let report = log(&mut Master::new(&mut bus, Timing::default()), &options, &mut kept).expect("rows");
     assert_eq!(report.two_devices.iter().map(Failure::kind).collect::<Vec<_>>(), [Kind::Unexpected]);
     assert!(kept.rows.iter().all(|row| !row.contains("7.5")), "{:?}", kept.rows);

@@ -2,7 +2,7 @@
 //! inhibit time, a TPDO has no identifier, the width of an object is unknown.
 
 use super::pdo_map::{Fault, FaultyBus};
-use super::probe::Kept;
+use super::probe::KeptJournal;
 use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
@@ -178,17 +178,17 @@ fn killed_change_of_the_inhibit_time_leaves_the_pdo_on() {
     let new = || Bench::new(description("", &parameters("default = \"$NODEID+0x180\"")));
     let inhibited = PdoRequest { inhibit_100us: Some(25), ..request(&[]) };
     let is_write = |frame: &&Frame| frame.id() == CanId::sdo_request(node()) && frame.data()[0] >> 5 == 1;
-    let run = |bus: &mut FaultyBus, journal: &mut Kept| {
+    let run = |bus: &mut FaultyBus, journal: &mut KeptJournal| {
         map(&mut Master::new(bus, Timing::default()), &inhibited, false, &BTreeMap::new(), journal)
     };
     let mut clean = FaultyBus::new(new().bus, Fault::None, 0);
-    let mut kept = Kept::default();
+    let mut kept = KeptJournal::default();
     assert_eq!((run(&mut clean, &mut kept).unwrap().writes, kept.0.len()), (3, 0));
     let writes = clean.sent.iter().enumerate().filter(|(_, frame)| is_write(frame)).map(|(at, _)| at);
     for (at, undone) in writes.zip([Undone::ChangedSince, Undone::Restored, Undone::Restored]) {
         let mut bench = new();
         let mut killed = FaultyBus::new(bench.bus, Fault::Gone, at);
-        let mut kept = Kept::default();
+        let mut kept = KeptJournal::default();
         run(&mut killed, &mut kept).expect_err("the device does not answer");
         bench.bus = killed.bus;
         let [write] = &kept.0[..] else { panic!("{} records", kept.0.len()) };

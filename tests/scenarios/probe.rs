@@ -54,9 +54,9 @@ fn ctrl_c_at_any_time_restores_the_heartbeat() {
 
 /// A journal that is kept after its program has ended, with the number of frames that were sent before each record.
 #[derive(Default)]
-pub(super) struct Kept(pub(super) Vec<TemporaryWrite>);
+pub(super) struct KeptJournal(pub(super) Vec<TemporaryWrite>);
 
-impl Journal for Kept {
+impl Journal for KeptJournal {
     fn record(&mut self, write: &TemporaryWrite) -> Result<(), JournalError> {
         self.0.push(write.clone());
         Ok(())
@@ -97,7 +97,7 @@ fn heartbeat_time(bus: &mut MemoryBus) -> u16 {
 fn probe_keeps_a_record_until_the_heartbeat_is_restored() {
     let node = NodeId::new(5).expect("a node-ID");
     let mut bus = bus_of("mh4", 0);
-    let mut journal = Kept::default();
+    let mut journal = KeptJournal::default();
     let mut master = Master::new(&mut bus, Timing::default());
     probe(&mut master, &Node::new(node), &mut journal).expect("the bus works");
     assert_eq!(journal.0, []);

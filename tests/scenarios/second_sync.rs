@@ -1,6 +1,6 @@
 //! Another node sends SYNC or NMT commands already. A second SYNC producer would double every synchronous TPDO.
 
-use super::Kept;
+use super::RecordedRows;
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
@@ -42,7 +42,7 @@ impl Station for Controller {
     fn sent(&mut self, _: Mono, _: &Frame) {}
 }
 
-fn record(mode: Mode) -> (MemoryBus, Kept, Result<u64, Failure>) {
+fn record(mode: Mode) -> (MemoryBus, RecordedRows, Result<u64, Failure>) {
     record_beside(Controller { next: Mono::START + PERIOD, frame: "080#" }, mode, true)
 }
 
@@ -68,9 +68,13 @@ fn options(mode: Mode, start_all: bool) -> LogOptions {
     }
 }
 
-fn record_beside(controller: Controller, mode: Mode, start_all: bool) -> (MemoryBus, Kept, Result<u64, Failure>) {
+fn record_beside(
+    controller: Controller,
+    mode: Mode,
+    start_all: bool,
+) -> (MemoryBus, RecordedRows, Result<u64, Failure>) {
     let mut bus = beside(controller);
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &options(mode, start_all), &mut kept);
     (bus, kept, outcome.map(|outcome| outcome.rows))
 }
@@ -178,7 +182,7 @@ fn second_sender_at_the_sync_of_another_producer_gives_no_rows() {
     let (mut bus, options) =
         (beside(Controller { next: Mono::START + PERIOD, frame: "080#" }), options(Mode::AsSent, false));
     bus.attach(SecondSender(None));
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let report = log(&mut Master::new(&mut bus, Timing::default()), &options, &mut kept).expect("the bus works");
     assert_eq!(report.two_devices.iter().map(Failure::kind).collect::<Vec<_>>(), [Kind::Unexpected]);
     assert_eq!(kept.rows.len(), 0);

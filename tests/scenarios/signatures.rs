@@ -169,7 +169,7 @@ fn frames(run: impl Fn(&mut FaultyBus), kind: &str, settings: &str) -> usize {
     bus.sent.len()
 }
 
-const STILL: &str = "[[device.channel]]\nchannel = 1\nbase = 0.0625\namplitude = 0.0\nnoise = 0.0\n";
+const CONSTANT_VALUE: &str = "[[device.channel]]\nchannel = 1\nbase = 0.0625\namplitude = 0.0\nnoise = 0.0\n";
 
 fn zero(bus: &mut FaultyBus, store: bool) -> Result<Zeroed, Failure> {
     let options = Options {
@@ -191,12 +191,12 @@ fn reported_zero_matches_the_device() {
         ("d20", "0x6124:1", (-0.0625f32).to_le_bytes()),
         ("dps", "0x6124:1", (-63i32).to_le_bytes()),
     ] {
-        let count = frames(|bus| drop(zero(bus, false)), kind, STILL);
+        let count = frames(|bus| drop(zero(bus, false)), kind, CONSTANT_VALUE);
         let mut acted_without_answer = 0;
         // The identification is the same for all kinds: it is tested once.
         let first = if kind == "mh4" { 0 } else { count.saturating_sub(20) };
         for (at, fault) in (first..count).flat_map(|at| FAULTS.map(|fault| (at, fault))) {
-            let mut bus = FaultyBus::of(kind, STILL, Some((at, fault)));
+            let mut bus = FaultyBus::of(kind, CONSTANT_VALUE, Some((at, fault)));
             let result = zero(&mut bus, false);
             let sent_count = bus.count("2561017A65726F");
             let place = format!("{kind}: {fault:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
@@ -233,10 +233,10 @@ fn zero_reported_as_stored_survives_a_reset() {
     for (kind, offset, new) in
         [("mh4", "0x6127:1", (-0.0625f32).to_le_bytes()), ("dps", "0x6124:1", (-63i32).to_le_bytes())]
     {
-        let count = frames(|bus| drop(zero(bus, true)), kind, STILL);
+        let count = frames(|bus| drop(zero(bus, true)), kind, CONSTANT_VALUE);
         // The steps before the store are tested without storing.
         for (at, fault) in (count.saturating_sub(25)..count).flat_map(|at| FAULTS.map(|fault| (at, fault))) {
-            let mut bus = FaultyBus::of(kind, STILL, Some((at, fault)));
+            let mut bus = FaultyBus::of(kind, CONSTANT_VALUE, Some((at, fault)));
             let result = zero(&mut bus, true);
             let place = format!("{kind}: {fault:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
             assert!(bus.count("73617665") <= 1 && bus.count("2561017A65726F") <= 1, "{place}");
@@ -319,10 +319,11 @@ fn acknowledged_signature_without_effect_is_detected() {
     let failure = load(&mut FaultyBus::of("mh4", RUNS, Some((at, Fault::Pretend)))).expect_err("nothing was restored");
     assert_eq!(failure.kind(), Kind::Unexpected);
     assert!(ErrorMessage::of(&failure).message.contains("restored and reset, but not at the defaults"), "{failure}");
-    let mut bus = FaultyBus::of("mh4", STILL, None);
+    let mut bus = FaultyBus::of("mh4", CONSTANT_VALUE, None);
     zero(&mut bus, false).expect("zero");
     let at = bus.sent.iter().position(|frame| frame.ends_with("7A65726F")).expect("\"zero\"");
-    let failure = zero(&mut FaultyBus::of("mh4", STILL, Some((at, Fault::Pretend))), false).expect_err("no zero");
+    let failure =
+        zero(&mut FaultyBus::of("mh4", CONSTANT_VALUE, Some((at, Fault::Pretend))), false).expect_err("no zero");
     assert_eq!(failure.kind(), Kind::Unexpected);
     assert!(
         ErrorMessage::of(&failure).message.contains("the device accepted the signature, and nothing has changed"),

@@ -1,6 +1,6 @@
 //! Causes of silence on the simulated bus, each with the reason that is printed. No reason may be false.
 
-use super::Kept;
+use super::RecordedRows;
 use super::log_goes_on::Other;
 use cangauge::bus::memory::MemoryBus;
 use cangauge::canopen::id::NodeId;
@@ -91,11 +91,11 @@ impl Case {
         Case { sync: Some(milliseconds), ..self }
     }
 
-    fn hears(self, others: &[(u64, &'static str)]) -> Case {
+    fn with_other_frames(self, others: &[(u64, &'static str)]) -> Case {
         Case { others: others.to_vec(), ..self }
     }
 
-    fn run(&self) -> (Result<RecordingReport, String>, Kept) {
+    fn run(&self) -> (Result<RecordingReport, String>, RecordedRows) {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("inputs.toml"), description()).expect("a file");
         let bench = Bench::from_toml(&format!("clock = \"virtual\"\n{}", self.bench), folder.path());
@@ -118,7 +118,7 @@ impl Case {
             max_gap: None,
             overrides: BTreeMap::new(),
         };
-        let mut kept = Kept::default();
+        let mut kept = RecordedRows::default();
         let result = log(&mut Master::new(&mut bus, Timing::default()), &options, &mut kept);
         (result.map_err(|failure| ErrorMessage::of(&failure).message), kept)
     }
@@ -142,16 +142,16 @@ fn heartbeats(state: &'static str) -> Vec<(u64, &'static str)> {
 }
 
 const BOTH_OFF: &str = "\"0x1800:1\" = 0xC0000185, \"0x1801:1\" = 0xC0000285";
-const ALIVE: &str = "\"0x1017\" = 100";
+const WITH_HEARTBEAT: &str = "\"0x1017\" = 100";
 
 #[test]
 fn node_that_left_operational_is_named_at_the_end() {
     let remarks = |case: Case, others: &[(u64, &'static str)]| -> Vec<String> {
-        let report = Case { seconds: Some(4), ..case }.hears(others).run().0.expect("a report");
+        let report = Case { seconds: Some(4), ..case }.with_other_frames(others).run().0.expect("a report");
         assert!(report.rows > 0);
         report.remarks.iter().map(remark_text).filter(|text| text.contains("left operational")).collect()
     };
-    let synced = || Case::mh4(ALIVE).sync(100);
+    let synced = || Case::mh4(WITH_HEARTBEAT).sync(100);
     let preop = [(2000, "000#8005"), (2010, "085#3081110000000000")];
     assert_eq!(
         remarks(synced(), &preop),
@@ -160,7 +160,7 @@ fn node_that_left_operational_is_named_at_the_end() {
     assert_eq!(remarks(synced(), &[(2000, "000#0205")]), ["node 5 left operational: it is stopped after the start"]);
     assert_eq!(remarks(synced(), &[(2000, "000#8005"), (2500, "000#0105")]), [""; 0], "it is operational again");
     // A polled node has values in each state.
-    let polled = || Case { poll: true, ..Case::mh4(ALIVE) };
+    let polled = || Case { poll: true, ..Case::mh4(WITH_HEARTBEAT) };
     assert_eq!(remarks(polled(), &[]), [""; 0], "it was never operational");
     assert_eq!(
         remarks(polled(), &[(500, "000#0105"), (2000, "000#8005")]),
@@ -171,7 +171,7 @@ fn node_that_left_operational_is_named_at_the_end() {
 #[test]
 fn emergency_about_the_length_of_sync_is_the_reason() {
     let rejected = [(3000, "085#4082110000000000"), (3500, "085#4082110000000000")];
-    let case = Case::mh4("\"0x1800:2\" = 240, \"0x1801:2\" = 240").sync(100).hears(&rejected);
+    let case = Case::mh4("\"0x1800:2\" = 240, \"0x1801:2\" = 240").sync(100).with_other_frames(&rejected);
     let (message, hint) = case.message();
     assert!(
         message.contains("TPDO1 waits for SYNC, and the node rejects the length of SYNC, emergency 8240h"),
@@ -179,7 +179,7 @@ fn emergency_about_the_length_of_sync_is_the_reason() {
     );
     assert!(hint.expect("a hint").contains("cangauge sdo read 5 0x1019"));
     // A TPDO that does not depend on SYNC has another reason.
-    let case = Case::mh4("\"0x1800:2\" = 254, \"0x1801:1\" = 0xC0000285").sync(100).hears(&rejected);
+    let case = Case::mh4("\"0x1800:2\" = 254, \"0x1801:1\" = 0xC0000285").sync(100).with_other_frames(&rejected);
     assert!(!case.message().0.contains("rejects"), "{}", case.message().0);
 }
 
@@ -193,7 +193,7 @@ fn each_cause_has_its_reason() {
         ("no SYNC", Case::mh4(""), "TPDO1 waits for SYNC, and no node sends SYNC"),
         (
             "no SYNC with the COB-ID of 1005h",
-            Case::mh4("\"0x1005\" = 0x81").hears(&[(3000, "080#"), (3100, "080#")]),
+            Case::mh4("\"0x1005\" = 0x81").with_other_frames(&[(3000, "080#"), (3100, "080#")]),
             "TPDO1 waits for SYNC with COB-ID 081 (1005h), and no node sends it",
         ),
         (
@@ -203,7 +203,7 @@ fn each_cause_has_its_reason() {
         ),
         (
             "too few SYNC of another node",
-            Case::mh4("\"0x1800:2\" = 3").hears(&[(1000, "080#"), (2000, "080#")]),
+            Case::mh4("\"0x1800:2\" = 3").with_other_frames(&[(1000, "080#"), (2000, "080#")]),
             "TPDO1 is sent at every 3th SYNC (1800h:2), and 2 SYNC were sent",
         ),
         ("on request", Case::mh4("\"0x1800:2\" = 253"), "TPDO1 is sent on remote request only (1800h:2 is 253)"),
@@ -235,12 +235,12 @@ fn each_cause_has_its_reason() {
         ),
         (
             "steady value",
-            Case::mh4(&format!("{event}, {ALIVE}, \"0x6133:1\" = 1000.0")),
+            Case::mh4(&format!("{event}, {WITH_HEARTBEAT}, \"0x6133:1\" = 1000.0")),
             "TPDO1 has no event timer (1800h:2 and :5), and its value does not change enough",
         ),
         (
             "event timer of another transmission type",
-            Case::mh4(&format!("{event}, {ALIVE}, \"0x1800:5\" = 100, \"0x6133:1\" = 1000.0")),
+            Case::mh4(&format!("{event}, {WITH_HEARTBEAT}, \"0x1800:5\" = 100, \"0x6133:1\" = 1000.0")),
             "TPDO1 has no event timer (1800h:2 and :5), and its value does not change enough",
         ),
         (
@@ -249,45 +249,51 @@ fn each_cause_has_its_reason() {
             "its value does not change enough, or the node is not operational",
         ),
         ("channel off", Case::mh4(&format!("{event}, \"0x6112:1\" = 0")), "its channel is off (0x6112:1 is 0)"),
-        ("stopped, with heartbeat", Case::mh4(ALIVE).hears(&[(1000, "000#0205")]), "it is stopped after the start"),
+        (
+            "stopped, with heartbeat",
+            Case::mh4(WITH_HEARTBEAT).with_other_frames(&[(1000, "000#0205")]),
+            "it is stopped after the start",
+        ),
         (
             "stopped by another master, without heartbeat",
-            Case::mh4("").hears(&[(1000, "000#0205")]),
+            Case::mh4("").with_other_frames(&[(1000, "000#0205")]),
             "it is stopped after the start (NMT command)",
         ),
         (
             "all are set to pre-operational by another master, without heartbeat",
-            Case::mh4("").hears(&[(1000, "000#8000")]),
+            Case::mh4("").with_other_frames(&[(1000, "000#8000")]),
             "it is pre-operational again after the start (NMT command)",
         ),
         (
             "stopped by another master, and started again",
-            Case::mh4("").hears(&[(1000, "000#0205"), (1100, "000#0105")]),
+            Case::mh4("").with_other_frames(&[(1000, "000#0205"), (1100, "000#0105")]),
             "TPDO1 waits for SYNC, and no node sends SYNC",
         ),
         (
             "pre-operational again, by guarding",
-            Case { nodes: vec![2], ..Case::of("[[device]]\nkind = \"d20\"\nnode = 2\n") }.hears(&[(120, "000#8002")]),
+            Case { nodes: vec![2], ..Case::of("[[device]]\nkind = \"d20\"\nnode = 2\n") }
+                .with_other_frames(&[(120, "000#8002")]),
             "it is pre-operational again after the start (node guarding)",
         ),
         (
             "falls back after an emergency",
-            Case::mh4("").hears(&[&[(150, "085#00FF810000000000")][..], &heartbeats("705#7F")[1..]].concat()),
+            Case::mh4("")
+                .with_other_frames(&[&[(150, "085#00FF810000000000")][..], &heartbeats("705#7F")[1..]].concat()),
             "it is pre-operational again after the start, emergency FF00h",
         ),
         (
             "no power, with heartbeat",
-            Case::of(&format!("{offline}set = {{ {ALIVE} }}\n")).hears(&[(1000, "000#8105")]),
+            Case::of(&format!("{offline}set = {{ {WITH_HEARTBEAT} }}\n")).with_other_frames(&[(1000, "000#8105")]),
             "its heartbeat stopped, and it does not answer: it has no power or cable",
         ),
         (
             "no power, without heartbeat",
-            Case::of(offline).hears(&[(1000, "000#8105")]),
+            Case::of(offline).with_other_frames(&[(1000, "000#8105")]),
             "it does not answer: it is stopped, or has no power or cable",
         ),
         (
             "restarted, and not started by this program",
-            Case { no_nmt: true, ..Case::mh4("") }.hears(&[(1000, "000#8105")]),
+            Case { no_nmt: true, ..Case::mh4("") }.with_other_frames(&[(1000, "000#8105")]),
             "it restarted, and has sent no heartbeat since",
         ),
         (
@@ -308,18 +314,19 @@ fn each_cause_has_its_reason() {
         (
             "another COB-ID than in 1800h:1, at SYNC",
             Case { no_nmt: true, ..Case::mh4("").sync(100) }
-                .hears(&[(2000, "1C5#0000A03F00"), (2100, "1C5#0000A03F00")]),
+                .with_other_frames(&[(2000, "1C5#0000A03F00"), (2100, "1C5#0000A03F00")]),
             "no TPDO1 was received (frames were received with COB-ID 1C5, which no TPDO of the node uses): \
              the node is not operational, or sends with another COB-ID",
         ),
         (
             "another COB-ID than in 1801h:1, by timer",
-            Case { no_nmt: true, ..Case::mh4(timer) }.hears(&[(2100, "3A5#00"), (2200, "745#05")]),
+            Case { no_nmt: true, ..Case::mh4(timer) }.with_other_frames(&[(2100, "3A5#00"), (2200, "745#05")]),
             "no TPDO2 was received (frames with COB-ID 3A5 were received",
         ),
         (
             "TPDO of another node with a heartbeat",
-            Case { no_nmt: true, ..Case::mh4("").sync(100) }.hears(&[(1500, "745#05"), (2000, "1C5#0000A03F00")]),
+            Case { no_nmt: true, ..Case::mh4("").sync(100) }
+                .with_other_frames(&[(1500, "745#05"), (2000, "1C5#0000A03F00")]),
             "no TPDO1 was received: the node answers SDO, and is probably not operational",
         ),
         (
@@ -329,7 +336,7 @@ fn each_cause_has_its_reason() {
         ),
         (
             "wrong length",
-            Case::mh4("").hears(&[(1000, "185#0102"), (2000, "185#0102")]),
+            Case::mh4("").with_other_frames(&[(1000, "185#0102"), (2000, "185#0102")]),
             "its TPDOs have 2 bytes, but their mapping has 5",
         ),
         (
@@ -378,7 +385,7 @@ fn each_cause_has_its_reason() {
 }
 
 /// The texts of the remarks during a recording.
-fn remarks(kept: &Kept) -> Vec<String> {
+fn remarks(kept: &RecordedRows) -> Vec<String> {
     let is_remark = |note: &&LogEvent| matches!(note, LogEvent::Remark(_));
     kept.notes.iter().filter(is_remark).map(|note| event_text(note).text).collect()
 }
@@ -429,7 +436,8 @@ fn device_that_was_replaced_is_an_event_and_a_failure() {
         ("605#2318100263000000", "it is another device"),
     ] {
         // After the wrong length, the program reads the node again.
-        let case = Case { seconds: Some(6), ..Case::of(inputs) }.hears(&[(2000, write), (2500, "185#0102030405")]);
+        let case =
+            Case { seconds: Some(6), ..Case::of(inputs) }.with_other_frames(&[(2000, write), (2500, "185#0102030405")]);
         let (result, kept) = case.run();
         let report = result.expect("a recording");
         assert_eq!(report.replaced.len(), 1);
@@ -506,7 +514,8 @@ fn short_recording_has_no_remarks_on_single_signals() {
         max_gap: None,
         overrides: BTreeMap::new(),
     };
-    let report = log(&mut Master::new(&mut bus, Timing::default()), &options, &mut Kept::default()).expect("rows");
+    let report =
+        log(&mut Master::new(&mut bus, Timing::default()), &options, &mut RecordedRows::default()).expect("rows");
     assert!(
         report.remarks.iter().all(|remark| !cangauge::output::events::remark_text(remark).contains("no measurements"))
     );

@@ -1,7 +1,7 @@
 //! A program that did not run for some time (Ctrl-Z, a suspended laptop, a busy host). It reads the frames that the
 //! kernel kept, and does not send the SYNCs that it missed.
 
-use super::Kept;
+use super::RecordedRows;
 use super::answers::Slow;
 use super::log_goes_on::Other;
 use cangauge::bus::memory::{Clock, MemoryBus};
@@ -119,7 +119,7 @@ fn missed_syncs_are_omitted() {
     let mut bus = stalled(text, 1000..1503, false);
     let period = Duration::from_millis(10);
     let plan = plan(Mode::Sync(period), Duration::from_secs(2));
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
     let syncs = bus.syncs;
     let begin = syncs[0];
@@ -159,7 +159,7 @@ fn frames_received_before_ctrl_c_are_recorded() {
     let text = "clock = \"virtual\"\n[[device]]\nkind = \"dps\"\nnode = 5\n";
     let mut bus = stalled(text, 1000..1503, true);
     let plan = plan(Mode::AsSent, Duration::from_secs(60));
-    let mut kept = Kept::default();
+    let mut kept = RecordedRows::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
     assert!(outcome.interrupted);
     assert_eq!(bus.waiting.len(), 0);
@@ -180,7 +180,7 @@ fn recording_with_a_count_ends_with_its_last_row() {
         let node = NodeId::new(5).expect("a node-ID");
         let overrides = BTreeMap::from([(node, catalog::by_name("dps").expect("built in"))]);
         let plan = LogOptions { count: Some(count), overrides, ..plan(Mode::Passive, Duration::from_secs(60)) };
-        let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut Kept::default());
+        let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut RecordedRows::default());
         let outcome = outcome.expect("a recording");
         assert_eq!((outcome.rows, outcome.lost), (count, Vec::new()));
         assert!(outcome.length <= Duration::from_millis(100) * u32::try_from(count).expect("small"));
@@ -207,7 +207,7 @@ fn frame_received_before_the_request_is_not_its_answer() {
 }
 
 #[test]
-fn late_answer_stays_late_although_it_is_read_later() {
+fn late_answer_is_rejected_after_a_pause_of_the_program() {
     let mut inner = MemoryBus::new(Clock::Virtual);
     inner.attach(Slow::new(&[150]));
     let mut bus = stall(inner, 0..500, false);

@@ -55,7 +55,7 @@ impl Played {
     }
 
     /// The next frame, received up to `until`.
-    fn hear(&mut self, until: Duration) -> Option<(Duration, Frame)> {
+    fn next_frame(&mut self, until: Duration) -> Option<(Duration, Frame)> {
         loop {
             match self.bus.receive(Mono::at(until)).expect("a memory bus never fails") {
                 Event::Frame(received) => return Some((received.at.mono.since_start(), received.frame)),
@@ -72,8 +72,8 @@ impl Played {
     /// After a case, checks that no frame arrives for 1 ms, unless the next case starts with a frame of the device.
     fn expect_silence(&mut self, place: &str) {
         if std::mem::take(&mut self.is_over) {
-            let heard = self.hear(self.now() + Duration::from_millis(1));
-            assert_eq!(heard, None, "{place}: unexpected frame before this line");
+            let received = self.next_frame(self.now() + Duration::from_millis(1));
+            assert_eq!(received, None, "{place}: unexpected frame before this line");
         }
     }
 
@@ -91,15 +91,15 @@ impl Played {
                 let (within, after) = after.strip_prefix('<').map_or((false, after), |after| (true, after));
                 let (after, tolerance) = (duration(after), Duration::from_millis(2));
                 let until = self.last.max(self.now()) + after + tolerance;
-                let (at, heard) = self.hear(until).unwrap_or_else(|| panic!("{place}: silence"));
-                assert_eq!(heard.to_string(), frame, "{place}: sent by the device");
+                let (at, received) = self.next_frame(until).unwrap_or_else(|| panic!("{place}: silence"));
+                assert_eq!(received.to_string(), frame, "{place}: sent by the device");
                 let waited = at - self.last;
                 assert!(within || waited + tolerance >= after, "{place}: after {waited:?} already");
                 self.last = at;
             }
             ":" => {
-                let heard = self.hear(duration(rest));
-                assert_eq!(heard, None, "{place}: silent until then");
+                let received = self.next_frame(duration(rest));
+                assert_eq!(received, None, "{place}: silent until then");
                 self.last = self.now();
             }
             "=" => self.is_over = true,

@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn without_the_kernel_the_moment_of_reading_counts() {
+    fn frame_without_kernel_time_gets_the_time_of_reading() {
         let (computer, mut clocks) = (Computer::new(), Clocks::default());
         computer.pass(100);
         clocks.batch(mono(90), true);

@@ -367,7 +367,7 @@ mod tests {
 
         /// Answers that arrive one step late make the scan longer or end it. They never produce a wrong address.
         #[test]
-        fn late_answers_make_up_nothing(parts: [u32; 4], late in proptest::collection::vec(0u8..40, 1..600)) {
+        fn late_answers_never_produce_a_wrong_address(parts: [u32; 4], late in proptest::collection::vec(0u8..40, 1..600)) {
             let address = LssAddress::new(parts);
             let mut slaves = [Slave::new(address)];
             let mut late = late.into_iter().map(|one_in| one_in == 0);

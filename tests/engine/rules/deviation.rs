@@ -1,51 +1,51 @@
 //! A device with a deviation causes no wrong value, no false reason and no unnecessary failure.
 
 use super::*;
-use crate::odd::{Oddity, TpdoFault};
+use crate::deviation::{Deviation, TpdoFault};
 use cangauge::canopen::frame::Frame;
 use cangauge::output::failure::ErrorMessage;
 
-/// Compares the result with the oddity of the device.
-pub(super) fn odd(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
-    let duplicate = spec.devices.iter().find(|device| device.oddity == Some(Oddity::DuplicateId));
+/// Compares the result with the deviation of the device.
+pub(super) fn deviation(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
+    let duplicate = spec.devices.iter().find(|device| device.deviation == Some(Deviation::DuplicateId));
     if let Some(duplicate) = duplicate.filter(|_| spec.shares_node_ids()) {
         duplicate_id(duplicate.node.unwrap_or_default(), run, violations);
     }
-    let odd = spec.devices.iter().find_map(|device| Some((device.node?, device.oddity?)));
-    let Some((node, oddity)) = odd.filter(|_| !spec.shares_node_ids()) else { return };
-    let has_it = run.bus.bus.inner().inner().stations::<FaultyDevice>().all(|station| station.has_oddity);
+    let found = spec.devices.iter().find_map(|device| Some((device.node?, device.deviation?)));
+    let Some((node, deviation)) = found.filter(|_| !spec.shares_node_ids()) else { return };
+    let has_it = run.bus.bus.inner().inner().stations::<FaultyDevice>().all(|station| station.has_deviation);
     if !has_it {
         return;
     }
-    match oddity {
-        Oddity::NoTpdo(fault) => reason(run, fault.reason(), fault, violations),
-        Oddity::Pdo(0..=7) => {
+    match deviation {
+        Deviation::NoTpdo(fault) => reason(run, fault.reason(), fault, violations),
+        Deviation::Pdo(0..=7) => {
             if let Some(row) = run.observed.rows.first() {
-                violations.push(("odd: no value from a short TPDO", row.clone()));
+                violations.push(("deviation: no value from a short TPDO", row.clone()));
             }
         }
-        Oddity::Clips => {
+        Deviation::Clips => {
             let is_clipped = |row: &&String| row.ends_with(",,bar,clipped,0xFF7F");
             let of_node = |row: &&String| row.split(',').nth(1) == Some(node.to_string().as_str());
             let wrong =
                 run.observed.rows.iter().filter(of_node).find(|row| row.ends_with("0xFF7F") && !is_clipped(row));
-            violations.extend(wrong.map(|row| ("odd: no value of a clipped integer", row.clone())));
+            violations.extend(wrong.map(|row| ("deviation: no value of a clipped integer", row.clone())));
             if matches!(run.result, Ok(Claim::Satisfied)) {
-                violations.push(("odd: no value of a clipped integer", "the check is satisfied".to_owned()));
+                violations.push(("deviation: no value of a clipped integer", "the check is satisfied".to_owned()));
             }
         }
-        Oddity::Unidentified => {
+        Deviation::Unidentified => {
             let is_known = |row: &&String| {
                 let cells: Vec<&str> = row.split(',').collect();
                 cells[1] == node.to_string() && !cells[3].is_empty()
             };
             if let Some(row) = run.observed.rows.iter().find(is_known) {
-                violations.push(("odd: no value of an unknown type", row.clone()));
+                violations.push(("deviation: no value of an unknown type", row.clone()));
             }
         }
         _ => {}
     }
-    if oddity.is_harmless() {
+    if deviation.is_harmless() {
         like_the_plain_device(spec, run, violations);
     }
 }
@@ -57,7 +57,7 @@ fn duplicate_id(node: u8, run: &Run, violations: &mut Vec<Violation>) {
         cells[1] == node.to_string() && !cells[3].is_empty()
     };
     let row = run.observed.rows.iter().find(has_value);
-    violations.extend(row.map(|row| ("odd: no value of two devices", row.clone())));
+    violations.extend(row.map(|row| ("deviation: no value of two devices", row.clone())));
     // After a collision, an answer arrives later or never, because a device may then be bus-off.
     let sent = run.bus.bus.inner().inner().stations::<FaultyDevice>().flat_map(|station| &station.sent);
     let answers: Vec<_> = sent
@@ -71,7 +71,7 @@ fn duplicate_id(node: u8, run: &Run, violations: &mut Vec<Violation>) {
             data.map(|data| data[4..].to_vec()).collect::<BTreeSet<_>>()
         };
         let differs = values.iter().find(|(_, object, _)| contents(*object).len() > 1);
-        violations.extend(differs.map(|value| ("odd: no value of two devices", format!("{value:?}"))));
+        violations.extend(differs.map(|value| ("deviation: no value of two devices", format!("{value:?}"))));
     }
     let requests = run.bus.all_sent();
     let requests =
@@ -84,7 +84,7 @@ fn duplicate_id(node: u8, run: &Run, violations: &mut Vec<Violation>) {
     let serials = answers.iter().filter(|(at, frame)| at < written && is_serial(frame));
     let is_single = is_asked && serials.count() == 1;
     if !is_single {
-        violations.push(("odd: no write to two devices", frame.to_string()));
+        violations.push(("deviation: no write to two devices", frame.to_string()));
     }
 }
 
@@ -97,19 +97,19 @@ fn reason(run: &Run, expected: &str, fault: TpdoFault, violations: &mut Vec<Viol
         Ok(_) => return,
     };
     if !said.contains(expected) {
-        violations.push(("odd: the reason for the silence", format!("{fault:?}: {said}")));
+        violations.push(("deviation: the reason for the silence", format!("{fault:?}: {said}")));
     }
 }
 
-/// The command ends as with a device that has no oddity.
+/// The command ends as with a device that has no deviation.
 fn like_the_plain_device(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     let mut plain = spec.clone();
-    plain.devices.iter_mut().for_each(|device| device.oddity = None);
+    plain.devices.iter_mut().for_each(|device| device.deviation = None);
     let plain = crate::run::run(&plain);
     let outcome = |run: &Run| (run.result.as_ref().err().map(|failure| failure.kind()), run.observed.rows.is_empty());
     if outcome(run) != outcome(&plain) {
         let how = format!("{:?} with {} rows", run.result, run.observed.rows.len());
         let without = format!("{:?} with {} rows", plain.result, plain.observed.rows.len());
-        violations.push(("odd: as without the oddity", format!("{how}, and without it {without}")));
+        violations.push(("deviation: as without the deviation", format!("{how}, and without it {without}")));
     }
 }

@@ -4,11 +4,11 @@ mod addressed;
 mod causes;
 mod checks;
 mod claims;
+mod deviation;
 mod frames;
 mod kept;
 mod killed;
-mod odd;
-mod put_back;
+mod restored;
 mod rows;
 mod silence;
 mod watched;
@@ -17,11 +17,11 @@ use addressed::{is_meant, named, others_unchanged};
 use causes::kinds;
 use checks::checks;
 use claims::{claims, last_writes};
+use deviation::deviation;
 use frames::frames;
 use kept::after_power;
 use killed::killed;
-use odd::odd;
-use put_back::put_back;
+use restored::restored;
 use rows::{rows, signatures};
 use silence::check_cause;
 use watched::watched;
@@ -47,7 +47,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// A violated rule, and the details of the violation.
 pub(crate) type Violation = (&'static str, String);
 
-pub(crate) fn judge(spec: &Spec, run: &mut Run) -> Vec<Violation> {
+pub(crate) fn check_rules(spec: &Spec, run: &mut Run) -> Vec<Violation> {
     let mut violations = Vec::new();
     ends(run, &mut violations);
     frames(spec, run.sent_by_killed(), &mut violations);
@@ -55,7 +55,7 @@ pub(crate) fn judge(spec: &Spec, run: &mut Run) -> Vec<Violation> {
     let after: Vec<DeviceState> =
         run.bus.bus.inner().inner().stations::<FaultyDevice>().map(|station| device_state(&station.device)).collect();
     others_unchanged(spec, run, &after, &mut violations);
-    put_back(spec, run, &after, &mut violations);
+    restored(spec, run, &after, &mut violations);
     kinds(spec, run, &mut violations);
     check_cause(spec, run, &mut violations);
     rows(spec, run, &mut violations);
@@ -63,7 +63,7 @@ pub(crate) fn judge(spec: &Spec, run: &mut Run) -> Vec<Violation> {
     checks(spec, run, &mut violations);
     signatures(spec, run, &mut violations);
     killed(spec, run, &mut violations);
-    odd(spec, run, &mut violations);
+    deviation(spec, run, &mut violations);
     if let Ok(said) = run.result.clone() {
         claims(spec, run, &said, &after, &mut violations);
         last_writes(spec, run, &mut violations);

@@ -10,7 +10,7 @@ use cangauge::output::failure::ErrorMessage;
 pub(super) fn after_power(spec: &Spec, run: &mut Run, violations: &mut Vec<Violation>) {
     let settled = run.settled;
     let bus = run.bus.bus.inner_mut().inner_mut();
-    bus.stations_mut::<FaultyDevice>().for_each(FaultyDevice::tame);
+    bus.stations_mut::<FaultyDevice>().for_each(FaultyDevice::remove_faults);
     bus.power_cycle();
     let after: Vec<DeviceState> = bus.stations::<FaultyDevice>().map(|station| device_state(&station.device)).collect();
     if let (Ok(Claim::Assigned { rate: Some(Some(rate)), stored: true, .. }), false) =

@@ -1,18 +1,18 @@
 //! Temporary changes are restored.
 
 use super::*;
-use crate::odd::Oddity;
+use crate::deviation::Deviation;
 use cangauge::bus::BitRateControl;
 use cangauge::bus::memory::BIT_RATE;
 use cangauge::output::failure::ErrorMessage;
 
 /// Everything that the command switched temporarily is restored.
-pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violations: &mut Vec<Violation>) {
+pub(super) fn restored(spec: &Spec, run: &mut Run, after: &[DeviceState], violations: &mut Vec<Violation>) {
     let detects = matches!(spec.command, Command::Detect { .. });
     let cannot = spec.loses_sent()
         // A device that floods the bus can delay the last frames.
-        || spec.device_faults().any(|fault| matches!(fault, DeviceFault::Hang { .. } | DeviceFault::Babbles { .. }))
-        || spec.devices.iter().any(|device| device.oddity.is_some_and(Oddity::has_own_state))
+        || spec.device_faults().any(|fault| matches!(fault, DeviceFault::Hang { .. } | DeviceFault::SendsEmergencies { .. }))
+        || spec.devices.iter().any(|device| device.deviation.is_some_and(Deviation::has_own_state))
         // Some devices use LSS in one NMT state only, and another master may change that state.
         || spec.acts().any(|act| matches!(act, Act::Nmt { .. }))
         || spec.devices.iter().any(|device| device.bit_rate.is_some()) && !detects;

@@ -16,7 +16,7 @@ use cangauge::sim::Device;
 
 /// A deviation from the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Oddity {
+pub(crate) enum Deviation {
     /// Reads of this index are not answered.
     Silent(u16),
     /// The toggle bit of segments is always 1.
@@ -119,12 +119,12 @@ impl TpdoFault {
     }
 }
 
-impl Oddity {
+impl Deviation {
     /// Changes the device after power-on. Returns whether it then has the deviation.
     pub(crate) fn power_on(self, device: &mut Device, now: Mono) -> bool {
         match (self, device.node()) {
-            (Oddity::NoTpdo(fault), Some(node)) => fault.set_up(device, now, node.get()),
-            (Oddity::Clips, Some(node)) => clip(device, now, node.get()),
+            (Deviation::NoTpdo(fault), Some(node)) => fault.set_up(device, now, node.get()),
+            (Deviation::Clips, Some(node)) => clip(device, now, node.get()),
             _ => true,
         }
     }
@@ -132,7 +132,7 @@ impl Oddity {
     /// Whether the device ignores a frame.
     pub(crate) fn ignores(self, frame: &Frame) -> bool {
         match (self, frame.data()) {
-            (Oddity::Silent(index), [0x40, low, high, ..]) => {
+            (Deviation::Silent(index), [0x40, low, high, ..]) => {
                 frame.id().sdo_request_node().is_some() && u16::from_le_bytes([*low, *high]) == index
             }
             _ => false,
@@ -141,19 +141,19 @@ impl Oddity {
 
     /// Whether the device does not send a frame.
     pub(crate) fn drops(self, frame: &Frame) -> bool {
-        matches!(self, Oddity::NoTpdo(TpdoFault::Multiplexed | TpdoFault::NothingMapped | TpdoFault::NotSent))
+        matches!(self, Deviation::NoTpdo(TpdoFault::Multiplexed | TpdoFault::NothingMapped | TpdoFault::NotSent))
             && is_tpdo(frame)
     }
 
     /// The NMT command that the device executes by itself when it becomes operational, and its emergency.
     pub(crate) fn own_command(self, node: NodeId) -> Option<(Frame, Option<Frame>)> {
         let specifier = match self {
-            Oddity::NoTpdo(TpdoFault::LeavesOperational | TpdoFault::Emergency) => NmtCommand::EnterPreOperational,
-            Oddity::NoTpdo(TpdoFault::Stops | TpdoFault::StopsWithoutHeartbeat) => NmtCommand::Stop,
+            Deviation::NoTpdo(TpdoFault::LeavesOperational | TpdoFault::Emergency) => NmtCommand::EnterPreOperational,
+            Deviation::NoTpdo(TpdoFault::Stops | TpdoFault::StopsWithoutHeartbeat) => NmtCommand::Stop,
             _ => return None,
         };
         let emergency = Frame::full(CanId::emergency(node), [0x00, 0xff, 0x81, 0, 0, 0, 0, 0]);
-        let sends = self == Oddity::NoTpdo(TpdoFault::Emergency);
+        let sends = self == Deviation::NoTpdo(TpdoFault::Emergency);
         Some((Frame::pair(CanId::NMT, specifier.specifier(), node.get()), sends.then_some(emergency)))
     }
 
@@ -162,13 +162,13 @@ impl Oddity {
         let mut data = frame.data().to_vec();
         let id = frame.id();
         match (self, id.sdo_response_node(), data.as_mut_slice()) {
-            (Oddity::WrongToggle, Some(_), [first, ..]) if *first >> 5 == 0 => *first |= 0x10,
-            (Oddity::IndexZero, Some(_), [0x60, rest @ ..]) => rest.fill(0),
-            (Oddity::Unidentified, Some(_), [_, 0x00, 0x10, 0, value @ ..]) => value.fill(0),
-            (Oddity::Unidentified, Some(_), [_, 0x18, 0x10, 1, value @ ..]) => {
+            (Deviation::WrongToggle, Some(_), [first, ..]) if *first >> 5 == 0 => *first |= 0x10,
+            (Deviation::IndexZero, Some(_), [0x60, rest @ ..]) => rest.fill(0),
+            (Deviation::Unidentified, Some(_), [_, 0x00, 0x10, 0, value @ ..]) => value.fill(0),
+            (Deviation::Unidentified, Some(_), [_, 0x18, 0x10, 1, value @ ..]) => {
                 value.copy_from_slice(&[0x77, 0, 0, 0x7f])
             }
-            (Oddity::NoTpdo(fault @ (TpdoFault::Multiplexed | TpdoFault::NothingMapped)), Some(_), answer) => {
+            (Deviation::NoTpdo(fault @ (TpdoFault::Multiplexed | TpdoFault::NothingMapped)), Some(_), answer) => {
                 match answer {
                     [0x40..=0x4f, 0..=0x0f, 0x1a, 0, count, ..] => {
                         *count = if fault == TpdoFault::Multiplexed { 0xfe } else { 0 };
@@ -176,8 +176,8 @@ impl Oddity {
                     _ => return frame,
                 }
             }
-            (Oddity::Heartbeat(length), None, _) if id.heartbeat_node().is_some() => data.resize(length, 0),
-            (Oddity::Pdo(length), None, _) if is_tpdo(&frame) => data.resize(length, 0),
+            (Deviation::Heartbeat(length), None, _) if id.heartbeat_node().is_some() => data.resize(length, 0),
+            (Deviation::Pdo(length), None, _) if is_tpdo(&frame) => data.resize(length, 0),
             _ => return frame,
         }
         Frame::new(id, &data).unwrap_or(frame)
@@ -193,14 +193,18 @@ impl Oddity {
             TpdoFault::Offline,
             TpdoFault::OfflineWithoutHeartbeat,
         ];
-        faults.into_iter().any(|fault| self == Oddity::NoTpdo(fault))
+        faults.into_iter().any(|fault| self == Deviation::NoTpdo(fault))
     }
 
     /// Whether the deviation has no effect on the results of the program.
     pub(crate) fn is_harmless(self) -> bool {
         !matches!(
             self,
-            Oddity::Unidentified | Oddity::Clips | Oddity::DuplicateId | Oddity::NoTpdo(_) | Oddity::Pdo(0..=7)
+            Deviation::Unidentified
+                | Deviation::Clips
+                | Deviation::DuplicateId
+                | Deviation::NoTpdo(_)
+                | Deviation::Pdo(0..=7)
         )
     }
 }
@@ -231,18 +235,20 @@ fn is_tpdo(frame: &Frame) -> bool {
 
 impl Spec {
     /// Gives one device a deviation, and chooses a command that is affected by it.
-    pub(crate) fn make_odd(&mut self, random: &mut Random) {
+    pub(crate) fn add_deviation(&mut self, random: &mut Random) {
         let fits = |device: &&mut DeviceSpec| {
             device.node.is_some() && model(device.kind).dictionary.get(ObjectId::new(0x1800, 1)).is_some()
         };
         let Some(device) = self.devices.iter_mut().find(fits) else { return };
         let node = device.node.expect("it has one");
-        let oddity = oddity(random);
-        device.oddity = Some(oddity);
+        let deviation = deviation(random);
+        device.deviation = Some(deviation);
         device.start = false;
-        if matches!(oddity, Oddity::Heartbeat(_) | Oddity::NoTpdo(_)) {
-            let has_no_heartbeat =
-                matches!(oddity, Oddity::NoTpdo(TpdoFault::StopsWithoutHeartbeat | TpdoFault::OfflineWithoutHeartbeat));
+        if matches!(deviation, Deviation::Heartbeat(_) | Deviation::NoTpdo(_)) {
+            let has_no_heartbeat = matches!(
+                deviation,
+                Deviation::NoTpdo(TpdoFault::StopsWithoutHeartbeat | TpdoFault::OfflineWithoutHeartbeat)
+            );
             device.heartbeat_ms = (!has_no_heartbeat).then_some(100);
         }
         self.timeout_ms = 100;
@@ -253,20 +259,20 @@ impl Spec {
             device.latency_us = device.latency_us.min(2_000);
             device.unsaved_heartbeat = None;
         }
-        self.command = command(oddity, node, random);
-        let odd = self.devices.iter().position(|device| device.oddity.is_some()).expect("it was chosen");
-        if oddity == Oddity::Clips {
-            self.devices[odd].kind = "mh4";
+        self.command = command(deviation, node, random);
+        let place = self.devices.iter().position(|device| device.deviation.is_some()).expect("it was chosen");
+        if deviation == Deviation::Clips {
+            self.devices[place].kind = "mh4";
         }
-        if oddity == Oddity::DuplicateId {
-            let kind = if random.percent(50) { self.devices[odd].kind } else { *random.pick(&["mh4", "dps", "d20"]) };
-            let serial = self.devices[odd].serial + 50;
-            self.devices.push(DeviceSpec { kind, serial, oddity: None, ..self.devices[odd].clone() });
+        if deviation == Deviation::DuplicateId {
+            let kind = if random.percent(50) { self.devices[place].kind } else { *random.pick(&["mh4", "dps", "d20"]) };
+            let serial = self.devices[place].serial + 50;
+            self.devices.push(DeviceSpec { kind, serial, deviation: None, ..self.devices[place].clone() });
         }
     }
 }
 
-fn oddity(random: &mut Random) -> Oddity {
+fn deviation(random: &mut Random) -> Deviation {
     let faults = [
         TpdoFault::Disabled,
         TpdoFault::OnRequest,
@@ -284,22 +290,22 @@ fn oddity(random: &mut Random) -> Oddity {
         TpdoFault::NotSent,
     ];
     match random.within(0..=13) {
-        11 => Oddity::Clips,
-        12 | 13 => Oddity::DuplicateId,
-        0 => Oddity::Silent(*random.pick(&[0x1008, 0x1009, 0x100a, 0x1018])),
-        1 => Oddity::WrongToggle,
-        2 => Oddity::Twice,
-        3 => Oddity::IndexZero,
-        4 => Oddity::Heartbeat(*random.pick(&[2, 3, 8])),
-        5 => Oddity::Pdo(8),
-        6 => Oddity::Pdo(*random.pick(&[0, 1])),
-        7 => Oddity::Unidentified,
-        _ => Oddity::NoTpdo(*random.pick(&faults)),
+        11 => Deviation::Clips,
+        12 | 13 => Deviation::DuplicateId,
+        0 => Deviation::Silent(*random.pick(&[0x1008, 0x1009, 0x100a, 0x1018])),
+        1 => Deviation::WrongToggle,
+        2 => Deviation::Twice,
+        3 => Deviation::IndexZero,
+        4 => Deviation::Heartbeat(*random.pick(&[2, 3, 8])),
+        5 => Deviation::Pdo(8),
+        6 => Deviation::Pdo(*random.pick(&[0, 1])),
+        7 => Deviation::Unidentified,
+        _ => Deviation::NoTpdo(*random.pick(&faults)),
     }
 }
 
 /// A command that is affected by the deviation.
-fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
+fn command(deviation: Deviation, node: u8, random: &mut Random) -> Command {
     let log = |sync_ms, poll_ms| Command::Log {
         nodes: vec![node],
         sync_ms,
@@ -317,9 +323,9 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
         log(Some(50), None),
         log(None, Some(100)),
     ];
-    let own = match oddity {
-        Oddity::Silent(_) | Oddity::WrongToggle | Oddity::Unidentified => of_values.to_vec(),
-        Oddity::Twice => [
+    let own = match deviation {
+        Deviation::Silent(_) | Deviation::WrongToggle | Deviation::Unidentified => of_values.to_vec(),
+        Deviation::Twice => [
             of_values.to_vec(),
             vec![
                 Command::SdoRead { node, object: heartbeat, how },
@@ -332,7 +338,7 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
             ],
         ]
         .concat(),
-        Oddity::Clips => vec![
+        Deviation::Clips => vec![
             log(Some(50), None),
             Command::PdoWatch { nodes: vec![node], for_ms: 500 },
             Command::Check {
@@ -342,7 +348,7 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
                 excuse: false,
             },
         ],
-        Oddity::DuplicateId => [
+        Deviation::DuplicateId => [
             of_values.to_vec(),
             vec![
                 Command::SdoRead { node, object: ObjectId::new(0x1018, 4), how },
@@ -359,8 +365,8 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
             ],
         ]
         .concat(),
-        Oddity::IndexZero => vec![Command::SdoWrite { node, object: heartbeat, bytes: vec![200, 0], how }],
-        Oddity::Heartbeat(_) => {
+        Deviation::IndexZero => vec![Command::SdoWrite { node, object: heartbeat, bytes: vec![200, 0], how }],
+        Deviation::Heartbeat(_) => {
             let what = [NmtCommand::Start, NmtCommand::Stop, NmtCommand::EnterPreOperational];
             let what = *random.pick(&what);
             vec![
@@ -369,8 +375,8 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
                 log(Some(50), None),
             ]
         }
-        Oddity::NoTpdo(TpdoFault::WaitsForSync | TpdoFault::SlowTimer) => vec![log(None, None)],
-        Oddity::NoTpdo(_) | Oddity::Pdo(_) => vec![log(Some(50), None)],
+        Deviation::NoTpdo(TpdoFault::WaitsForSync | TpdoFault::SlowTimer) => vec![log(None, None)],
+        Deviation::NoTpdo(_) | Deviation::Pdo(_) => vec![log(Some(50), None)],
     };
     random.pick(&own).clone()
 }

@@ -56,7 +56,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
                 // A device that floods the bus can cause any time-out.
                 matches!(
                     device_fault,
-                    DeviceFault::Hang { .. } | DeviceFault::OfflineAfterReset | DeviceFault::Babbles { .. }
+                    DeviceFault::Hang { .. } | DeviceFault::OfflineAfterReset | DeviceFault::SendsEmergencies { .. }
                 )
             })
         {
@@ -70,7 +70,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     if failure.kind() == Kind::NoAnswer && all_there(spec) && !may_be_silent(spec) {
         violations.push(("names the cause", format!("all devices answer: {}", details())));
     }
-    if failure.kind() == Kind::Unexpected && !may_be_odd(spec, &ErrorMessage::of(failure).message) {
+    if failure.kind() == Kind::Unexpected && !may_deviate(spec, &ErrorMessage::of(failure).message) {
         violations.push(("names the cause", format!("nothing is unexpected: {}", details())));
     }
     if failure.kind() == Kind::Refused
@@ -90,7 +90,7 @@ fn records(spec: &Spec) -> bool {
 }
 
 fn quiet(spec: &Spec) -> bool {
-    spec.others.is_empty() && spec.device_faults().next().is_none() && all_there(spec) && spec.is_clean_but_for_faults()
+    spec.others.is_empty() && spec.device_faults().next().is_none() && all_there(spec) && spec.has_only_bus_faults()
 }
 
 fn all_there(spec: &Spec) -> bool {
@@ -104,7 +104,7 @@ fn may_be_silent(spec: &Spec) -> bool {
         || spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }
 
-fn may_be_odd(spec: &Spec, message: &str) -> bool {
+fn may_deviate(spec: &Spec, message: &str) -> bool {
     let only = matches!(
         spec.command,
         Command::Assign { target: Target::Only, .. } | Command::LssStore { target: Target::Only, .. }
