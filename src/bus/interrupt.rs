@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// The longest sleep. A longer sleep could overflow an [`Instant`].
-const A_CENTURY: Duration = Duration::from_secs(100 * 365 * 24 * 3600);
+const MAX_SLEEP: Duration = Duration::from_secs(100 * 365 * 24 * 3600);
 
 /// Receives the signals SIGINT and SIGTERM.
 ///
@@ -55,7 +55,7 @@ impl Interrupts {
     /// Sleeps for `length`, or returns `true` at once when a signal arrives. Any length is allowed.
     pub fn wait_for(&mut self, length: Duration) -> bool {
         let now = Instant::now();
-        self.wait_until(now.checked_add(length).unwrap_or(now + A_CENTURY))
+        self.wait_until(now.checked_add(length).unwrap_or(now + MAX_SLEEP))
     }
 }
 

@@ -36,7 +36,7 @@ pub fn in_parallel<T: Send, R: Send>(
         let (mut procedures, mut threads) = (Vec::new(), Vec::new());
         for item in items {
             let ((calls, called), (answers, answered)) = (channel(), channel());
-            let mut share = Share {
+            let mut procedure_bus = ProcedureBus {
                 name: bus.name().to_owned(),
                 timestamps: bus.timestamps(),
                 is_live: bus.is_live(),
@@ -47,11 +47,11 @@ pub fn in_parallel<T: Send, R: Send>(
                 calls,
                 answers: answered,
             };
-            threads.push(scope.spawn(move || work(&mut share, item)));
+            threads.push(scope.spawn(move || work(&mut procedure_bus, item)));
             let missed = VecDeque::new();
             procedures.push(Procedure { calls: called, answers, filters: Filters::All, until: None, missed });
         }
-        Conductor::new(bus, procedures).carry_out();
+        Dispatcher::new(bus, procedures).carry_out();
         let results = threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
         results.collect()
     })
@@ -72,7 +72,7 @@ enum Answer {
 }
 
 /// The bus of one procedure.
-struct Share {
+struct ProcedureBus {
     name: String,
     timestamps: TimestampSource,
     is_live: bool,
@@ -85,7 +85,7 @@ struct Share {
     answers: Receiver<Answer>,
 }
 
-impl Share {
+impl ProcedureBus {
     /// `None` if the thread with the real bus ended.
     fn call(&self, call: Call) -> Option<Answer> {
         self.calls.send(call).ok()?;
@@ -100,7 +100,7 @@ impl Share {
     }
 }
 
-impl Bus for Share {
+impl Bus for ProcedureBus {
     fn name(&self) -> &str {
         &self.name
     }
@@ -144,7 +144,7 @@ impl Bus for Share {
     }
 }
 
-impl BitRateControl for Share {
+impl BitRateControl for ProcedureBus {
     fn bit_rate(&self) -> Option<u32> {
         self.bit_rate
     }
@@ -162,14 +162,14 @@ struct Procedure {
 }
 
 /// Limits the bus load of the procedures.
-struct Pace {
+struct LoadLimiter {
     /// `None` if it is unknown. The load is then not limited.
     bit_rate: Option<u32>,
     /// When the next frame may be sent.
     ready_at: Mono,
 }
 
-impl Pace {
+impl LoadLimiter {
     /// A frame was sent. Its answer is assumed to have the same length.
     fn on_sent(&mut self, frame: &Frame, now: Mono) {
         let Some(bit_rate) = self.bit_rate else { return };
@@ -178,25 +178,25 @@ impl Pace {
 }
 
 /// Carries out the calls of all procedures on the real bus.
-struct Conductor<'a> {
+struct Dispatcher<'a> {
     bus: &'a mut dyn Bus,
     procedures: Vec<Procedure>,
     /// The frames that wait to be sent, with their procedures.
     waiting: VecDeque<(usize, Frame)>,
     /// Since when the bus accepts no frame.
     full_since: Option<Mono>,
-    pace: Pace,
+    limiter: LoadLimiter,
 }
 
-impl Conductor<'_> {
-    fn new(bus: &mut dyn Bus, procedures: Vec<Procedure>) -> Conductor<'_> {
+impl Dispatcher<'_> {
+    fn new(bus: &mut dyn Bus, procedures: Vec<Procedure>) -> Dispatcher<'_> {
         let (now, bit_rate) = (bus.mono(), bus.bit_rate().filter(|rate| *rate > 0));
-        Conductor {
+        Dispatcher {
             bus,
             procedures,
             waiting: VecDeque::new(),
             full_since: None,
-            pace: Pace { bit_rate, ready_at: now },
+            limiter: LoadLimiter { bit_rate, ready_at: now },
         }
     }
 
@@ -205,7 +205,7 @@ impl Conductor<'_> {
         (0..self.procedures.len()).for_each(|at| self.serve(at));
         loop {
             self.send_waiting();
-            let ready_at = self.waiting.front().map(|_| self.pace.ready_at);
+            let ready_at = self.waiting.front().map(|_| self.limiter.ready_at);
             let untils = self.procedures.iter().filter_map(|procedure| procedure.until);
             let Some(until) = untils.chain(ready_at).min() else { return };
             let event = self.bus.receive(until);
@@ -237,7 +237,7 @@ impl Conductor<'_> {
 
     /// Sends the waiting frames in their order, as far as the bus load allows it.
     fn send_waiting(&mut self) {
-        while self.pace.ready_at <= self.bus.mono()
+        while self.limiter.ready_at <= self.bus.mono()
             && let Some((at, frame)) = self.waiting.pop_front()
         {
             let result = self.bus.send(&frame);
@@ -246,13 +246,13 @@ impl Conductor<'_> {
                 let since = *self.full_since.get_or_insert(now);
                 if now.since(since) < RETRY_LIMIT {
                     self.waiting.push_front((at, frame));
-                    self.pace.ready_at = now + RETRY_INTERVAL;
+                    self.limiter.ready_at = now + RETRY_INTERVAL;
                     return;
                 }
             }
             self.full_since = None;
             if result.is_ok() {
-                self.pace.on_sent(&frame, now);
+                self.limiter.on_sent(&frame, now);
             }
             self.answer(at, Answer::Done(result));
         }

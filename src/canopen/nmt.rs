@@ -140,7 +140,7 @@ impl Life {
     }
 
     /// The node and the length of a frame on 700h + node-ID, unless the frame has one byte as CiA 301 requires.
-    pub fn odd_length(frame: &Frame) -> Option<(NodeId, usize)> {
+    pub fn unusual_length(frame: &Frame) -> Option<(NodeId, usize)> {
         let node = frame.id().heartbeat_node().filter(|_| !frame.is_remote())?;
         let length = frame.data().len();
         (length != 1).then_some((node, length))
@@ -200,7 +200,10 @@ mod tests {
         }
         assert_eq!(Life::parse(&frame("77F#0000")), Some((node, Life::BootUp)));
         assert_eq!(Life::parse(&frame("0FF#")), Some((node, Life::BootUp)), "before CiA 301 version 4");
-        let odd = |text| Life::odd_length(&frame(text)).map(|(_, length)| length);
-        assert_eq!((odd("77F#"), odd("77F#05"), odd("77F#0500"), odd("77F#R1")), (Some(0), None, Some(2), None));
+        let unusual = |text| Life::unusual_length(&frame(text)).map(|(_, length)| length);
+        assert_eq!(
+            (unusual("77F#"), unusual("77F#05"), unusual("77F#0500"), unusual("77F#R1")),
+            (Some(0), None, Some(2), None)
+        );
     }
 }

@@ -6,7 +6,7 @@ use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
-use crate::device::catalog::{self, MadeFor, Model};
+use crate::device::catalog::{self, Model, TargetDevice};
 use crate::device::eds;
 use crate::master::{Master, OnTwoDevices};
 use crate::node::Overrides;
@@ -46,13 +46,13 @@ impl Named {
 }
 
 /// A file and a node with a different device.
-type Misfits = BTreeSet<(usize, NodeId)>;
+type Mismatches = BTreeSet<(usize, NodeId)>;
 
 /// The descriptions named by the user, for
 /// `nodes`. For a single node, the device is compared with the files when the bus is opened: see [`check_pending`].
 pub(super) fn overrides(global: &Global, nodes: &[NodeId]) -> anyhow::Result<Overrides> {
     let named = named(global)?;
-    let overrides = combine(&named, nodes, &Misfits::new());
+    let overrides = combine(&named, nodes, &Mismatches::new());
     if nodes.len() == 1 && !named.is_empty() {
         global.pending.replace(Some((named, nodes.to_vec())));
     }
@@ -65,28 +65,27 @@ pub(super) fn overrides(global: &Global, nodes: &[NodeId]) -> anyhow::Result<Ove
 /// A file is not for the device of its node. A file without a node does not match any node.
 pub(super) fn overrides_on(master: &mut Master<'_>, global: &Global, nodes: &[NodeId]) -> anyhow::Result<Overrides> {
     let named = named(global)?;
-    let misfits = misfits(master, global, &named, nodes)?;
-    Ok(combine(&named, nodes, &misfits))
+    let mismatches = mismatches(master, global, &named, nodes)?;
+    Ok(combine(&named, nodes, &mismatches))
 }
 
 /// Compares the device with the files that were read before the bus was opened.
 pub(super) fn check_pending(master: &mut Master<'_>, global: &Global) -> anyhow::Result<()> {
     match global.pending.take() {
-        Some((named, nodes)) => misfits(master, global, &named, &nodes).map(drop),
+        Some((named, nodes)) => mismatches(master, global, &named, &nodes).map(drop),
         None => Ok(()),
     }
 }
 
 /// One description for each node. A description for this node has priority over one for all nodes, and a description
 /// has priority over an EDS.
-fn combine(named: &[Named], nodes: &[NodeId], misfits: &Misfits) -> Overrides {
+fn combine(named: &[Named], nodes: &[NodeId], mismatches: &Mismatches) -> Overrides {
     let mut overrides = Overrides::new();
     for &node in nodes {
         let find = |is_eds: bool| {
-            let fitting = named
-                .iter()
-                .enumerate()
-                .filter(|(at, named)| named.is_eds == is_eds && named.is_for(node) && !misfits.contains(&(*at, node)));
+            let fitting = named.iter().enumerate().filter(|(at, named)| {
+                named.is_eds == is_eds && named.is_for(node) && !mismatches.contains(&(*at, node))
+            });
             fitting.max_by_key(|(_, named)| named.node.is_some()).map(|(_, named)| &named.model)
         };
         let model = match (find(false), find(true)) {
@@ -100,15 +99,20 @@ fn combine(named: &[Named], nodes: &[NodeId], misfits: &Misfits) -> Overrides {
 
 /// Compares vendor and product of the files with those of the devices (1018h). Returns the files that are not used,
 /// each with the node.
-fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[NodeId]) -> anyhow::Result<Misfits> {
-    let mut misfits = Misfits::new();
-    let is_compared = |device: &MadeFor| device.vendor.or(device.product).is_some();
+fn mismatches(
+    master: &mut Master<'_>,
+    global: &Global,
+    named: &[Named],
+    nodes: &[NodeId],
+) -> anyhow::Result<Mismatches> {
+    let mut mismatches = Mismatches::new();
+    let is_compared = |device: &TargetDevice| device.vendor.or(device.product).is_some();
     let can_ask = master.bus().is_live() && !matches!(global.claim, Claim::Nothing);
     if !can_ask || !named.iter().any(|named| named.model.made_for.iter().any(is_compared)) {
-        return Ok(misfits);
+        return Ok(mismatches);
     }
     master.listen_to(nodes).or_fail()?;
-    for (node, model) in combine(named, nodes, &misfits) {
+    for (node, model) in combine(named, nodes, &mismatches) {
         master.set_quirks(node, &model.description.quirks);
     }
     let devices = revisions(master, nodes).or_fail()?;
@@ -125,7 +129,7 @@ fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[N
         }
         let Some((node, [vendor, product, _])) = others.first() else { continue };
         if !fitting.is_empty() && named.node.is_none() {
-            misfits.extend(others.iter().map(|(node, _)| (at, **node)));
+            mismatches.extend(others.iter().map(|(node, _)| (at, **node)));
             continue;
         }
         let message = mismatch(named.file(), **node, device, *vendor, *product);
@@ -141,7 +145,7 @@ fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[N
         }
         global.console().warn(&message);
     }
-    Ok(misfits)
+    Ok(mismatches)
 }
 
 /// Whether the device has the profile (1000h) of a description, as far as both are known.
@@ -154,7 +158,7 @@ fn has_profile_of(master: &mut Master<'_>, node: NodeId, model: &Model) -> anyho
     Ok(profile(described).zip(profile(found)).is_none_or(|(described, found)| described == found))
 }
 
-fn mismatch(file: &str, node: NodeId, device: &MadeFor, vendor: Option<u32>, product: Option<u32>) -> String {
+fn mismatch(file: &str, node: NodeId, device: &TargetDevice, vendor: Option<u32>, product: Option<u32>) -> String {
     let code = |number: Option<u32>| number.map_or_else(|| "unknown".to_owned(), |number| format!("0x{number:X}"));
     format!(
         "node {node}: {file} is for another device: vendor {}, product {}; the device has vendor {}, product {}",

@@ -401,7 +401,7 @@ impl Global {
                 self.console().warn(&output::failure::second_answer(node, answers));
             }
         }
-        for (node, length) in master.odd_heartbeats().filter(|_| self.shows_states) {
+        for (node, length) in master.unusual_heartbeats().filter(|_| self.shows_states) {
             self.console().warn(&output::events::heartbeat_text(node, length));
         }
         let unknown = master.unknown_objects();

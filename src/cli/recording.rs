@@ -4,7 +4,7 @@ use super::Global;
 use super::args::{BusSpec, Duration};
 use crate::measure::expression::verdict::{Outcome, Verdict};
 use crate::output::console::Console;
-use crate::output::events::{EventText, Weight};
+use crate::output::events::{EventText, Severity};
 use crate::output::failure::ErrorMessage;
 use crate::output::verdict;
 
@@ -45,10 +45,10 @@ pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Res
 
 /// Prints an event of a recording on stderr.
 pub(super) fn print_event(console: &Console, event: &EventText) {
-    match event.weight {
-        Weight::Warning => console.warn(&event.text),
-        Weight::Note => console.note(&event.text),
-        Weight::Detail => console.detail(&event.text),
+    match event.severity {
+        Severity::Warning => console.warn(&event.text),
+        Severity::Note => console.note(&event.text),
+        Severity::Detail => console.detail(&event.text),
     }
 }
 

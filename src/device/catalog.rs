@@ -23,14 +23,14 @@ pub struct Model {
     /// Objects whose type the description leaves open; they are read as bytes.
     pub untyped: BTreeSet<ObjectId>,
     /// The device of the description, and the device of each EDS file that was merged into it.
-    pub made_for: Vec<MadeFor>,
+    pub made_for: Vec<TargetDevice>,
     /// Warnings about objects, each with the index of its object.
     pub warnings: Vec<(u16, String)>,
 }
 
 /// The device that a description or an EDS file is for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct MadeFor {
+pub struct TargetDevice {
     /// The file, or the name of a built-in description.
     pub file: String,
     /// 1018h:1; 0 or `None` if it is not compared.
@@ -41,7 +41,7 @@ pub struct MadeFor {
     pub revision: Option<u32>,
 }
 
-impl MadeFor {
+impl TargetDevice {
     /// Whether a device may be of this kind: vendor and product agree. Unknown numbers are not compared.
     pub fn fits(&self, vendor: Option<u32>, product: Option<u32>) -> bool {
         same(self.vendor, vendor) && same(self.product, product)
@@ -62,7 +62,7 @@ fn same(wanted: Option<u32>, found: Option<u32>) -> bool {
 
 /// The answers of a device about itself; `None` for an object that it did not answer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Traits {
+pub struct IdentityAnswers {
     /// 1000h.
     pub device_type: Option<u32>,
     /// 1018h:1.
@@ -71,7 +71,7 @@ pub struct Traits {
     pub product_code: Option<u32>,
     /// 1008h.
     pub device_name: Option<String>,
-    /// The objects that [`to_ask`] asked for, as received.
+    /// The objects that [`objects_to_read`] asked for, as received.
     pub answers: BTreeMap<ObjectId, Vec<u8>>,
 }
 
@@ -101,7 +101,7 @@ impl Model {
         })?;
         let mut dictionary = Dictionary::new();
         description.objects.iter().for_each(|object| dictionary.insert_described(object));
-        let made_for = MadeFor {
+        let made_for = TargetDevice {
             file: description.name.clone(),
             vendor: description.identify.vendor_id,
             product: description.identify.product_code,
@@ -118,7 +118,7 @@ impl Model {
             vendor: eds.info.vendor_name.clone().unwrap_or_default(),
             ..Description::default()
         };
-        let made_for = MadeFor {
+        let made_for = TargetDevice {
             file: description.name.clone(),
             vendor: eds.info.vendor_number,
             product: eds.info.product_number,
@@ -147,7 +147,7 @@ impl Model {
     }
 
     /// Whether the identity agrees with the description, as far as it can be compared without further reading.
-    fn has_identity(&self, traits: &Traits) -> bool {
+    fn has_identity(&self, traits: &IdentityAnswers) -> bool {
         fn agrees<T: PartialEq>(wanted: &Option<T>, found: &Option<T>) -> bool {
             wanted.is_none() || wanted == found
         }
@@ -161,7 +161,7 @@ impl Model {
 
     /// Whether the objects that confirm the identity have the required values. Bytes beyond the type's width are
     /// ignored: a server that omits the size sends four.
-    fn is_confirmed(&self, traits: &Traits) -> bool {
+    fn is_confirmed(&self, traits: &IdentityAnswers) -> bool {
         self.description.identify.confirm.iter().all(|(&object, value)| {
             let wanted = self.dictionary.get(object).and_then(|entry| value.encode(entry.data_type, NodeId::MIN).ok());
             match (wanted, traits.answers.get(&object)) {
@@ -256,8 +256,8 @@ pub fn has_vendor(vendor: u32) -> bool {
 }
 
 /// The objects that must be read before [`recognise`] can decide. Empty if they are not needed, or if no description
-/// can fit. The caller reads them, and adds the received bytes to [`Traits::answers`].
-pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {
+/// can fit. The caller reads them, and adds the received bytes to [`IdentityAnswers::answers`].
+pub fn objects_to_read(traits: &IdentityAnswers) -> Vec<ObjectId> {
     // Other descriptions with the same number of identity keys cannot change the decision. Only a description with more
     // identity keys would have priority.
     let decided = recognise(traits).map_or(0, |model| model.rank().0);
@@ -274,7 +274,7 @@ pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {
 
 /// The description that fits the answers of a device: a description of the user, else a built-in one. If several fit,
 /// the most specific one is used. If two are equally specific, none is used.
-pub fn recognise(traits: &Traits) -> Option<Arc<Model>> {
+pub fn recognise(traits: &IdentityAnswers) -> Option<Arc<Model>> {
     let fits = |model: &&Arc<Model>| model.has_identity(traits) && model.is_confirmed(traits);
     let best = |mut fitting: Vec<&Arc<Model>>| {
         fitting.sort_by_key(|model| std::cmp::Reverse(model.rank()));
@@ -299,12 +299,12 @@ mod tests {
     }
 
     /// The answers of a device of this description.
-    fn traits_of(model: &Model) -> Traits {
+    fn traits_of(model: &Model) -> IdentityAnswers {
         let bytes = |object: ObjectId| model.dictionary.get(object).and_then(|entry| entry.default_bytes(node()));
         let number = |index, sub| {
             bytes(ObjectId::new(index, sub)).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes)
         };
-        Traits {
+        IdentityAnswers {
             device_type: number(0x1000, 0),
             vendor_id: number(0x1018, 1),
             product_code: number(0x1018, 2),
@@ -358,7 +358,7 @@ mod tests {
     fn one_different_answer_is_not_recognised() {
         for model in built_in() {
             let wanted = &model.description.identify;
-            let own = Traits {
+            let own = IdentityAnswers {
                 device_type: wanted.device_type,
                 vendor_id: wanted.vendor_id,
                 product_code: wanted.product_code,
@@ -369,10 +369,10 @@ mod tests {
             assert_eq!(model.has_identity(&own), !wanted.is_empty(), "{}", model.description.name);
             let other = |number: Option<u32>| number.map(|number| number ^ 1);
             let others = [
-                Traits { device_type: other(own.device_type), ..own.clone() },
-                Traits { vendor_id: other(own.vendor_id), ..own.clone() },
-                Traits { product_code: other(own.product_code), ..own.clone() },
-                Traits { device_name: own.device_name.clone().map(|name| name + "!"), ..own.clone() },
+                IdentityAnswers { device_type: other(own.device_type), ..own.clone() },
+                IdentityAnswers { vendor_id: other(own.vendor_id), ..own.clone() },
+                IdentityAnswers { product_code: other(own.product_code), ..own.clone() },
+                IdentityAnswers { device_name: own.device_name.clone().map(|name| name + "!"), ..own.clone() },
             ];
             let wrong: Vec<_> = others.iter().filter(|other| **other != own && model.has_identity(other)).collect();
             assert!(wrong.is_empty(), "{}: {wrong:?}", model.description.name);
@@ -418,7 +418,7 @@ mod tests {
                 assert_eq!(recognise(&traits).map(|found| found.description.name.clone()), None);
                 continue;
             }
-            for object in to_ask(&traits) {
+            for object in objects_to_read(&traits) {
                 // The device rejects objects that only other descriptions contain.
                 let Some(entry) = model.dictionary.get(object) else { continue };
                 let mut bytes = entry.default_bytes(node()).expect("a default");
@@ -429,16 +429,17 @@ mod tests {
                 recognise(&traits).map(|found| found.description.name.clone()).as_ref(),
                 Some(&model.description.name)
             );
-            assert_eq!(to_ask(&traits), []);
+            assert_eq!(objects_to_read(&traits), []);
         }
     }
 
     #[test]
     fn another_device_of_the_same_profile_is_not_recognised() {
         // Many devices have the type 0x00020194; the other answers decide.
-        let mut traits = Traits { device_type: Some(0x0002_0194), vendor_id: Some(0x99), ..Traits::default() };
+        let mut traits =
+            IdentityAnswers { device_type: Some(0x0002_0194), vendor_id: Some(0x99), ..IdentityAnswers::default() };
         assert_eq!(recognise(&traits).map(|model| model.description.name.clone()), None);
-        let asked = to_ask(&traits);
+        let asked = objects_to_read(&traits);
         let scaling = [0x7121, 0x7122, 0x7123].map(|index| ObjectId::new(index, 16));
         let fixed_mapping = [0x1a00, 0x1a04].map(|index| ObjectId::new(index, 1));
         assert_eq!(asked, [&fixed_mapping[..], &scaling[..]].concat());
@@ -447,9 +448,9 @@ mod tests {
         traits.answers.insert(scaling[0], Vec::new());
         traits.answers.insert(fixed_mapping[0], vec![0x20, 0x01, 0x30, 0x61]);
         assert_eq!(recognise(&traits).map(|model| model.description.name.clone()), None);
-        assert_eq!(to_ask(&traits), [fixed_mapping[1], scaling[2]]);
+        assert_eq!(objects_to_read(&traits), [fixed_mapping[1], scaling[2]]);
         // If a device does not answer, no further objects are read.
-        assert_eq!(to_ask(&Traits::default()), []);
-        assert_eq!(recognise(&Traits::default()).map(|model| model.description.name.clone()), None);
+        assert_eq!(objects_to_read(&IdentityAnswers::default()), []);
+        assert_eq!(recognise(&IdentityAnswers::default()).map(|model| model.description.name.clone()), None);
     }
 }

@@ -230,7 +230,7 @@ impl Active {
     }
 
     /// How long the request has been repeated after the usual retries.
-    pub(super) fn overtime(&self, now: Mono, timing: &Timing) -> Duration {
+    pub(super) fn time_after_retries(&self, now: Mono, timing: &Timing) -> Duration {
         let usual = self.timeout(timing) * (1 + timing.retries);
         self.asked_at.map_or(Duration::ZERO, |asked_at| now.since(asked_at).saturating_sub(usual))
     }

@@ -48,7 +48,7 @@ pub struct Gathered<T> {
     /// The different answers, in the order of arrival.
     pub answers: Vec<T>,
     /// Whether more than one slave answered: the answers differ, or there were more answers than requests.
-    pub crowded: bool,
+    pub has_several_slaves: bool,
     /// Faults during the exchange. Slaves that send different answers at the same time cause them.
     pub faults: Vec<Fault>,
 }
@@ -56,7 +56,7 @@ pub struct Gathered<T> {
 impl<T> Gathered<T> {
     /// Whether there is one answer and no sign of a second slave.
     pub fn is_one(&self) -> bool {
-        self.answers.len() == 1 && !self.crowded && !self.faults.iter().any(|fault| is_collision(*fault))
+        self.answers.len() == 1 && !self.has_several_slaves && !self.faults.iter().any(|fault| is_collision(*fault))
     }
 }
 
@@ -263,7 +263,7 @@ impl<'bus> Lss<'_, 'bus> {
         if !exchange.has_answer() {
             return Ok(Others::Unproven);
         }
-        if exchange.is_crowded() {
+        if exchange.has_several_slaves() {
             return Ok(Others::Within(same));
         }
         for range in address.neighbours().into_iter().chain(address.revisions()).flatten() {
@@ -306,7 +306,11 @@ impl<'bus> Lss<'_, 'bus> {
         if answers.is_empty() && !self.faults.iter().any(|fault| is_collision(*fault)) {
             return Err(self.error(&exchange, ExchangeError::NoAnswer));
         }
-        Ok(Gathered { answers, crowded: exchange.is_crowded(), faults: std::mem::take(&mut self.faults) })
+        Ok(Gathered {
+            answers,
+            has_several_slaves: exchange.has_several_slaves(),
+            faults: std::mem::take(&mut self.faults),
+        })
     }
 
     fn error(&self, exchange: &Exchange, error: ExchangeError) -> LssError {

@@ -226,8 +226,8 @@ impl<'bus> Master<'bus> {
     }
 
     /// The nodes with heartbeats of a length other than one byte, and the length of the first one.
-    pub fn odd_heartbeats(&self) -> impl Iterator<Item = (NodeId, usize)> {
-        self.sdo.odd_heartbeats()
+    pub fn unusual_heartbeats(&self) -> impl Iterator<Item = (NodeId, usize)> {
+        self.sdo.unusual_heartbeats()
     }
 
     /// Makes sure, before the first write to a node, that no two devices have its node-ID.
@@ -235,7 +235,7 @@ impl<'bus> Master<'bus> {
     /// # Errors
     /// Outer: the bus failed or the user interrupted. Inner: two devices answer.
     pub fn ensure_single(&mut self, node: NodeId) -> Result<Result<(), SdoError>, Error> {
-        if self.sdo.needs_check(node) {
+        if self.sdo.take_check(node) {
             // The result is ignored: an abort is an answer too. If the device is silent, the write fails.
             self.transfer_one(Request::read(node, SERIAL_NUMBER).once())?.ok();
         }

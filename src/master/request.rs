@@ -246,7 +246,7 @@ pub enum SdoFailure {
     Disturbed,
     /// The time limit of the transfer, or of all transfers, has passed.
     #[error("not finished within {}", format_duration(*.0))]
-    Overtime(Duration),
+    TimeLimit(Duration),
     /// The caller cancelled the transfer, or the node did not answer an earlier transfer.
     #[error("not finished")]
     Cancelled,

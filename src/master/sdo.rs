@@ -61,19 +61,19 @@ pub(super) struct SdoClient {
     pub(super) missed_answers: MissedAnswers,
     pub(super) heard: Heard,
     /// The length of the first heartbeat of each node whose length is not one byte.
-    odd_heartbeats: BTreeMap<NodeId, usize>,
+    unusual_heartbeats: BTreeMap<NodeId, usize>,
 }
 
 impl SdoClient {
     /// Records a heartbeat of another length than one byte.
     pub(super) fn on_other_frame(&mut self, frame: &Frame) {
-        if let Some((node, length)) = Life::odd_length(frame) {
-            self.odd_heartbeats.entry(node).or_insert(length);
+        if let Some((node, length)) = Life::unusual_length(frame) {
+            self.unusual_heartbeats.entry(node).or_insert(length);
         }
     }
 
-    pub(super) fn odd_heartbeats(&self) -> impl Iterator<Item = (NodeId, usize)> {
-        self.odd_heartbeats.iter().map(|(&node, &length)| (node, length))
+    pub(super) fn unusual_heartbeats(&self) -> impl Iterator<Item = (NodeId, usize)> {
+        self.unusual_heartbeats.iter().map(|(&node, &length)| (node, length))
     }
 
     pub(super) fn submit(&mut self, request: Request) -> Ticket {
@@ -187,7 +187,7 @@ impl SdoClient {
     }
 
     /// Ends all transfers if their common time limit has passed.
-    fn end_overtime(&mut self, now: Mono, outgoing: &mut Outgoing) {
+    fn end_after_limit(&mut self, now: Mono, outgoing: &mut Outgoing) {
         let Some((_, time)) = self.limit.filter(|&(until, _)| now >= until) else { return };
         for node in self.nodes.values_mut() {
             let mut out = Vec::new();
@@ -199,7 +199,7 @@ impl SdoClient {
             }
             out.into_iter().for_each(|frame| outgoing.push(frame, None));
             for (ticket, request) in node.waiting.drain(..) {
-                self.finished.push_back((ticket, Err(request.error(SdoFailure::Overtime(time)))));
+                self.finished.push_back((ticket, Err(request.error(SdoFailure::TimeLimit(time)))));
             }
         }
         (self.due, self.can_start) = (None, false);
@@ -230,7 +230,7 @@ impl SdoClient {
 
     /// Handles the transfers whose deadline has passed.
     pub(super) fn on_time(&mut self, now: Mono, timing: &Timing, outgoing: &mut Outgoing) {
-        self.end_overtime(now, outgoing);
+        self.end_after_limit(now, outgoing);
         if self.due.is_none_or(|due| now < due) {
             return;
         }
@@ -289,10 +289,10 @@ impl SdoClient {
                 node.waiting.push_front((active.ticket, active.request));
                 continue;
             }
-            self.missed_answers.add_time_without_answer(active.overtime(now, timing));
+            self.missed_answers.add_time_without_answer(active.time_after_retries(now, timing));
             let missed = self.missed_answers.end(active.request.node);
             let failure = match active.request.operation() {
-                _ if is_over => SdoFailure::Overtime(active.time(timing)),
+                _ if is_over => SdoFailure::TimeLimit(active.time(timing)),
                 Operation::Read if active.foreign.is_served() => active.disturbance(),
                 _ => SdoFailure::NoAnswer { waited: active.timeout(timing), started: has_begun, missed },
             };
@@ -317,7 +317,7 @@ impl SdoClient {
 
     /// Takes over what another client found out about its nodes.
     pub(super) fn merge(&mut self, other: SdoClient) {
-        self.odd_heartbeats.extend(other.odd_heartbeats);
+        self.unusual_heartbeats.extend(other.unusual_heartbeats);
         for (id, other) in other.nodes {
             let node = self.nodes.entry(id).or_default();
             node.answers = other.answers;
@@ -339,8 +339,8 @@ impl SdoClient {
     }
 
     /// Whether the serial number of a node must be read before the first write.
-    pub(super) fn needs_check(&mut self, node: NodeId) -> bool {
-        self.nodes.entry(node).or_default().answers.needs_check()
+    pub(super) fn take_check(&mut self, node: NodeId) -> bool {
+        self.nodes.entry(node).or_default().answers.take_check()
     }
 
     /// The end of the time in which second answers may arrive. `None` if no node needs this time, or if a transfer is

@@ -109,7 +109,7 @@ pub struct Answers {
     wait_until: Option<Mono>,
     /// Whether a second answer was once awaited and did not arrive: only one device has this node-ID.
     is_single: bool,
-    /// Whether [`Answers::needs_check`] was called.
+    /// Whether [`Answers::take_check`] was called.
     is_checked: bool,
 }
 
@@ -125,7 +125,7 @@ impl Answers {
 
     /// Whether the serial number must be read before the first write. This is needed if the node has not answered yet,
     /// or if its answers arrive twice. Only the first call returns `true`.
-    pub(super) fn needs_check(&mut self) -> bool {
+    pub(super) fn take_check(&mut self) -> bool {
         let is_first = !std::mem::replace(&mut self.is_checked, true);
         is_first && (self.latest.is_none() || self.finding.is_some())
     }
@@ -327,6 +327,6 @@ mod tests {
         // After a repeated answer, the master waits after every request again.
         assert!(log.on_unexpected(&frame(SERIAL), ms(32)));
         assert_eq!(log.wait_until(), Some(ms(35)));
-        assert!(Answers::default().needs_check());
+        assert!(Answers::default().take_check());
     }
 }

@@ -5,7 +5,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::TpdoNumber;
 use crate::canopen::value::DataType;
-use crate::device::catalog::{Model, Traits};
+use crate::device::catalog::{IdentityAnswers, Model};
 use crate::device::unit::Unit;
 use crate::measure::layout::{Layout, Signal, Tpdo};
 use std::sync::Arc;
@@ -44,13 +44,13 @@ impl Identity {
     }
 
     /// The facts by which a device description is recognised.
-    pub fn traits(&self) -> Traits {
-        Traits {
+    pub fn traits(&self) -> IdentityAnswers {
+        IdentityAnswers {
             device_type: self.device_type,
             vendor_id: self.vendor,
             product_code: self.product,
             device_name: self.name.clone(),
-            ..Traits::default()
+            ..IdentityAnswers::default()
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Reads objects of nodes.
 
-use super::survey::Ask;
+use super::survey::ObjectReader;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
@@ -14,9 +14,9 @@ pub type Item = (NodeId, ObjectId, DataType);
 ///
 /// # Errors
 /// Bus errors and Ctrl-C. The failure of one device is in its result.
-pub fn read_values<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Result<Value, SdoError>>, A::Stop> {
+pub fn read_values<A: ObjectReader>(master: &mut A, items: &[Item]) -> Result<Vec<Result<Value, SdoError>>, A::Stop> {
     let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
-    let answers = master.ask(&objects)?;
+    let answers = master.read_objects(&objects)?;
     let values = answers.into_iter().zip(items).map(|(answer, &(node, object, data_type))| {
         answer.and_then(|answer| answer.value(node, object, Some(data_type))).map(|(value, _)| value)
     });
@@ -41,7 +41,7 @@ pub struct Reader<'a, A> {
 /// For each node: the first error, and the number of consecutive objects without an answer.
 type Silences = BTreeMap<NodeId, (SdoError, u32)>;
 
-impl<'a, A: Ask> Reader<'a, A> {
+impl<'a, A: ObjectReader> Reader<'a, A> {
     /// A reader that has read nothing.
     pub fn new(master: &'a mut A) -> Reader<'a, A> {
         Reader { master, answered: BTreeMap::new(), failed: BTreeMap::new(), known: BTreeMap::new() }
@@ -62,7 +62,7 @@ impl<'a, A: Ask> Reader<'a, A> {
             let asked: Vec<(NodeId, ObjectId)> = open.iter().map(|&at| objects[at]).collect();
             let (mut rest, mut unanswered) = (Vec::new(), BTreeSet::new());
             let before = repeated.len();
-            for (at, result) in open.into_iter().zip(self.master.ask(&asked)?) {
+            for (at, result) in open.into_iter().zip(self.master.read_objects(&asked)?) {
                 let (node, object) = objects[at];
                 match result.as_ref().map_err(|error| &error.failure) {
                     // This object was not read, because an earlier read got no answer.
@@ -78,7 +78,7 @@ impl<'a, A: Ask> Reader<'a, A> {
                     // `None` may be late answers of one device.
                     Err(SdoFailure::TwoDevices(Some(_)) | SdoFailure::NotWritten(_))
                         if self.master.tolerates_two_devices() => {}
-                    Err(SdoFailure::TwoDevices(Some(_)) | SdoFailure::NotWritten(_) | SdoFailure::Overtime(_)) => {
+                    Err(SdoFailure::TwoDevices(Some(_)) | SdoFailure::NotWritten(_) | SdoFailure::TimeLimit(_)) => {
                         self.failed.extend(result.as_ref().err().map(|error| (node, error.clone())));
                     }
                     Ok(_) | Err(SdoFailure::Refused(_) | SdoFailure::Fit(_)) => {
@@ -117,7 +117,7 @@ impl<'a, A: Ask> Reader<'a, A> {
     fn check_silent(&mut self, silences: &Silences) -> Result<(), A::Stop> {
         for (&node, (error, count)) in silences.iter().filter(|(_, (_, count))| *count > 1) {
             let is_alive = match self.answered.get(&node).filter(|_| *count <= MAX_SILENT) {
-                Some(&object) => self.master.ask(&[(node, object)])?.iter().all(|answer| {
+                Some(&object) => self.master.read_objects(&[(node, object)])?.iter().all(|answer| {
                     answer.as_ref().err().is_none_or(|error| matches!(error.failure, SdoFailure::Refused(_)))
                 }),
                 None => false,

@@ -1,7 +1,7 @@
 //! Reads the facts for decoding the measurements of a device: identity, TPDOs, units, digits.
 //!
-//! Many nodes are read in parallel, in the same steps. They are read with an [`Ask`]: the master, which waits for the
-//! answers, or a [`BackgroundSurvey`], which does not wait.
+//! Many nodes are read in parallel, in the same steps. They are read with an [`ObjectReader`]: the master, which waits
+//! for the answers, or a [`BackgroundSurvey`], which does not wait.
 
 mod background;
 mod ranges;
@@ -12,7 +12,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::value::{DataType, Value};
-use crate::device::catalog::{Model, Traits, recognise, to_ask};
+use crate::device::catalog::{IdentityAnswers, Model, objects_to_read, recognise};
 use crate::device::quirk::Quirk;
 use crate::device::unit::Unit;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
@@ -37,7 +37,7 @@ pub type Overrides = BTreeMap<NodeId, Arc<Model>>;
 pub const SETUP_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Reads objects for a survey.
-pub trait Ask {
+pub trait ObjectReader {
     /// Why the survey cannot continue.
     type Stop: From<Error>;
 
@@ -45,7 +45,7 @@ pub trait Ask {
     ///
     /// # Errors
     /// A failure that stops the whole survey. The failure of one device is in its result.
-    fn ask(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Self::Stop>;
+    fn read_objects(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Self::Stop>;
 
     /// Sets how a node's SDO server deviates from the standard.
     fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]);
@@ -57,10 +57,10 @@ pub trait Ask {
     fn add_unknown(&mut self, node: NodeId, object: ObjectId);
 }
 
-impl Ask for Master<'_> {
+impl ObjectReader for Master<'_> {
     type Stop = Error;
 
-    fn ask(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Error> {
+    fn read_objects(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Error> {
         let requests = objects.iter().map(|&(node, object)| Request::read(node, object)).collect();
         self.transfer(requests, &mut |_| {})
     }
@@ -87,7 +87,7 @@ fn unsigned<T: TryFrom<u64>>(value: Option<&Value>) -> Option<T> {
 }
 
 /// Reads the identity of nodes. The name (1008h) is read only from the nodes for which `reads_name` is true.
-fn identities<A: Ask>(
+fn identities<A: ObjectReader>(
     reader: &mut Reader<'_, A>,
     nodes: &[NodeId],
     reads_name: impl Fn(NodeId, &Identity) -> bool,
@@ -143,7 +143,11 @@ pub fn revisions(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<N
 ///
 /// # Errors
 /// A node does not answer, or the survey cannot continue.
-pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
+pub fn survey_nodes<A: ObjectReader>(
+    master: &mut A,
+    nodes: &[NodeId],
+    overrides: &Overrides,
+) -> Result<Vec<Node>, A::Stop> {
     survey_with(&mut Reader::new(master), nodes, overrides)
 }
 
@@ -151,7 +155,7 @@ pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overri
 ///
 /// # Errors
 /// As [`survey_nodes`].
-pub fn survey_with<A: Ask>(
+pub fn survey_with<A: ObjectReader>(
     reader: &mut Reader<'_, A>,
     nodes: &[NodeId],
     overrides: &Overrides,
@@ -171,11 +175,15 @@ pub fn survey_with<A: Ask>(
 ///
 /// # Errors
 /// A node does not answer, or the survey cannot continue.
-pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
+pub fn identify<A: ObjectReader>(
+    master: &mut A,
+    nodes: &[NodeId],
+    overrides: &Overrides,
+) -> Result<Vec<Node>, A::Stop> {
     identify_with(&mut Reader::new(master), nodes, overrides)
 }
 
-fn identify_with<A: Ask>(
+fn identify_with<A: ObjectReader>(
     reader: &mut Reader<'_, A>,
     nodes: &[NodeId],
     overrides: &Overrides,
@@ -188,12 +196,12 @@ fn identify_with<A: Ask>(
         overrides.get(&node).is_none_or(|model| model.description.signals.is_empty() && !identity.fits(model))
     };
     let identities = identities(reader, nodes, reads_name)?;
-    let mut traits: Vec<Traits> = identities.iter().map(Identity::traits).collect();
+    let mut traits: Vec<IdentityAnswers> = identities.iter().map(Identity::traits).collect();
     let questions: Vec<(usize, ObjectId)> = nodes
         .iter()
         .enumerate()
         .filter(|(at, node)| reads_name(**node, &identities[*at]))
-        .flat_map(|(at, _)| to_ask(&traits[at]).into_iter().map(move |object| (at, object)))
+        .flat_map(|(at, _)| objects_to_read(&traits[at]).into_iter().map(move |object| (at, object)))
         .collect();
     let objects: Vec<(NodeId, ObjectId)> = questions.iter().map(|&(at, object)| (nodes[at], object)).collect();
     for (&(at, object), answer) in questions.iter().zip(reader.answers(&objects)?) {
@@ -219,7 +227,7 @@ fn identify_with<A: Ask>(
     Ok(found)
 }
 
-fn read_services<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
+fn read_services<A: ObjectReader>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let objects = [
         (ObjectId::new(0x1017, 0), U16),
         (ObjectId::new(0x1014, 0), U32),
@@ -262,7 +270,7 @@ fn tpdo_numbers(node: &Node) -> Vec<TpdoNumber> {
     if described.is_empty() { (1..=UNDESCRIBED_TPDOS).filter_map(TpdoNumber::new).collect() } else { described }
 }
 
-fn read_tpdos<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
+fn read_tpdos<A: ObjectReader>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let wanted: Vec<(usize, TpdoNumber)> = nodes
         .iter()
         .enumerate()
@@ -317,7 +325,7 @@ fn read_tpdos<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<
 
 /// Finds the signals of each node. The first of these that exists is used: the signals of the description, the channels
 /// of CiA 404, the values of the profile together with the contents of the TPDOs.
-fn find_signals<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
+fn find_signals<A: ObjectReader>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let mut unknown = Vec::new();
     let mut others = Vec::new();
     for (at, node) in nodes.iter_mut().enumerate() {
@@ -362,7 +370,11 @@ fn channel_values(node: &Node, counts: &[Option<Value>]) -> Vec<ObjectId> {
 }
 
 /// The signals of devices without channels of CiA 404.
-fn find_objects<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node], others: &[usize]) -> Result<(), A::Stop> {
+fn find_objects<A: ObjectReader>(
+    reader: &mut Reader<'_, A>,
+    nodes: &mut [Node],
+    others: &[usize],
+) -> Result<(), A::Stop> {
     let rows: Vec<_> = others
         .iter()
         .flat_map(|&at| signals::profile_values(&nodes[at]).map(move |(row, object)| (at, row, object)))
@@ -383,7 +395,7 @@ fn find_objects<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node], others: 
     Ok(())
 }
 
-fn read_units<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
+fn read_units<A: ObjectReader>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     // Node, signal, and the objects with the unit, the decimal digits and the resolution of the signal.
     let mut wanted: Vec<(usize, usize, [Option<ObjectId>; 3])> = Vec::new();
     for (at, node) in nodes.iter().enumerate() {

@@ -23,7 +23,10 @@ pub fn toml(draft: &Draft) -> String {
     };
     line("# A first description, read from the device. Lines with \"fill in\" need its manual.".to_owned());
     line("# The format: man cangauge-device. Check it with: cangauge devices check FILE".to_owned());
-    line(format!("name = {}  # fill in: a short name for --device", quoted(&free(&title, "device", &mut names))));
+    line(format!(
+        "name = {}  # fill in: a short name for --device",
+        quoted(&unused_name(&title, "device", &mut names))
+    ));
     line(format!("title = {}", quoted(&title)));
     line("vendor = \"unknown\"  # fill in".to_owned());
     line("# source = \"\"  # fill in: the manual, with its edition".to_owned());
@@ -48,7 +51,7 @@ pub fn toml(draft: &Draft) -> String {
 }
 
 /// A valid name that is not in use.
-fn free(name: &str, fallback: &str, used: &mut BTreeSet<String>) -> String {
+fn unused_name(name: &str, fallback: &str, used: &mut BTreeSet<String>) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
     let words: String = name.chars().map(plain).collect();
     let words: Vec<&str> = words.split('-').filter(|word| !word.is_empty()).collect();
@@ -77,7 +80,7 @@ fn signal_entry(draft: &Draft, signal: &Signal, names: &mut BTreeSet<String>) ->
     let name = if signal.name == value.to_string() { fallback.clone() } else { signal.name.clone() };
     let mut lines = vec![
         "\n[[signal]]".to_owned(),
-        format!("name = {}  # fill in: pressure, temperature", quoted(&free(&name, &fallback, names))),
+        format!("name = {}  # fill in: pressure, temperature", quoted(&unused_name(&name, &fallback, names))),
     ];
     if signal.has_channel() {
         lines.push(format!("channel = {}", signal.channel));
@@ -114,14 +117,18 @@ fn object_entry(draft: &Draft, found: &DraftObject, names: &mut BTreeSet<String>
     // Numbered objects share a name, so `at` is a range of sub-indices. A range adds the number to the name.
     let (at, name) = match &found.name {
         Some(name) if found.is_numbered && object.sub > 0 => {
-            let plain = free(name, &fallback, &mut BTreeSet::new());
+            let plain = unused_name(name, &fallback, &mut BTreeSet::new());
             let key = format!("{plain}:{:04x}", object.index);
             let is_other = names.contains(&plain) && !names.contains(&key);
             names.extend([plain.clone(), key]);
-            if is_other { (object.to_string(), free(&fallback, &fallback, names)) } else { (run(object), plain) }
+            if is_other {
+                (object.to_string(), unused_name(&fallback, &fallback, names))
+            } else {
+                (sub_index_range(object), plain)
+            }
         }
-        Some(name) => (object.to_string(), free(name, &fallback, names)),
-        None => (object.to_string(), free(&fallback, &fallback, names)),
+        Some(name) => (object.to_string(), unused_name(name, &fallback, names)),
+        None => (object.to_string(), unused_name(&fallback, &fallback, names)),
     };
     let data_type = found.data_type.map_or_else(|| "?".to_owned(), |data_type| data_type.to_string());
     let mut lines = vec![
@@ -152,7 +159,7 @@ fn object_entry(draft: &Draft, found: &DraftObject, names: &mut BTreeSet<String>
     }
 }
 
-fn run(object: ObjectId) -> String {
+fn sub_index_range(object: ObjectId) -> String {
     format!("{object}-{}", object.sub)
 }
 

@@ -14,7 +14,7 @@ pub const COLUMNS: [&str; 5] = ["time", "elapsed_s", "node", "event", "text"];
 
 /// The importance of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Weight {
+pub enum Severity {
     /// A problem.
     Warning,
     /// Information.
@@ -33,13 +33,13 @@ pub struct EventText {
     /// One line.
     pub text: String,
     /// How it is shown.
-    pub weight: Weight,
+    pub severity: Severity,
 }
 
 impl EventText {
     /// An event that does not belong to a single node.
-    pub fn of_all(event: &'static str, weight: Weight, text: String) -> EventText {
-        EventText { event: Some(event), node: None, text, weight }
+    pub fn of_all(event: &'static str, severity: Severity, text: String) -> EventText {
+        EventText { event: Some(event), node: None, text, severity }
     }
 }
 

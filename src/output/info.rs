@@ -1,7 +1,7 @@
 //! The page of `cangauge info` as aligned text.
 
 use super::table::{self, Align};
-use crate::device::catalog::{self, MadeFor};
+use crate::device::catalog::{self, TargetDevice};
 use crate::measure::sample::Status;
 use crate::tasks::settings::errors::Errors;
 use crate::tasks::settings::info::{Channel, Date, Info, Meaning, Monitoring, Setting};
@@ -104,7 +104,7 @@ pub(super) fn monitoring(Monitoring { heartbeat_ms, guarding_ms }: Monitoring) -
 /// The source of the description: `built-in`, or its files.
 pub(super) fn source(info: &Info) -> Option<String> {
     let model = info.node.model.as_ref()?;
-    let place = |device: &MadeFor| match catalog::text(&device.file) {
+    let place = |device: &TargetDevice| match catalog::text(&device.file) {
         Some(_) => "built-in".to_owned(),
         None => super::text::safe(&device.file),
     };

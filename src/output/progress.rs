@@ -13,7 +13,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// The rate of rows is measured over at least this time.
-const SECOND: Duration = Duration::from_secs(1);
+const MIN_RATE_WINDOW: Duration = Duration::from_secs(1);
 
 /// Redraws per second.
 pub(super) const REDRAWS_PER_SECOND: u8 = 10;
@@ -76,7 +76,7 @@ impl Progress {
             return;
         }
         let passed = counts.elapsed.saturating_sub(self.second.0);
-        if passed >= SECOND {
+        if passed >= MIN_RATE_WINDOW {
             self.rows_per_second = counts.rows.saturating_sub(self.second.1) as f64 / passed.as_secs_f64();
             self.second = (counts.elapsed, counts.rows);
         }

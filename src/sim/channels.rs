@@ -20,7 +20,7 @@ const FAMILIES: [u16; 4] = [0x6000, 0x7000, 0x8000, 0x9000];
 
 /// The contents of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Shows {
+enum ObjectContent {
     Value,
     Net,
     Field,
@@ -56,7 +56,7 @@ const IN_PV_UNIT: [(u16, Kind); 10] = [
 #[derive(Clone, Debug)]
 pub(super) struct Channels {
     list: Vec<Channel>,
-    shown: BTreeMap<ObjectId, (usize, Shows)>,
+    shown: BTreeMap<ObjectId, (usize, ObjectContent)>,
 }
 
 #[derive(Clone, Debug)]
@@ -129,7 +129,7 @@ impl Channels {
 
     /// The meaning of a mapped object, if it is a measured value.
     pub(super) fn reading(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Reading> {
-        let (index, Shows::Value) = *self.shown.get(&object)? else { return None };
+        let (index, ObjectContent::Value) = *self.shown.get(&object)? else { return None };
         let channel = self.list.get(index)?;
         let integer = matches!(objects.spec(object)?.data_type, DataType::Integer(_) | DataType::Unsigned(_));
         Some(Reading {
@@ -144,13 +144,13 @@ impl Channels {
 
     /// Whether an object contains the status of a channel.
     pub(super) fn is_status(&self, object: ObjectId) -> bool {
-        self.shown.get(&object).is_some_and(|(_, shows)| *shows == Shows::Status)
+        self.shown.get(&object).is_some_and(|(_, shows)| *shows == ObjectContent::Status)
     }
 
     /// The measured value at `time` as the number in the object: an integer is multiplied by its power of ten. The
     /// number is without marker and rounding.
     pub(super) fn number(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<f64> {
-        let (index, Shows::Value) = *self.shown.get(&object)? else { return None };
+        let (index, ObjectContent::Value) = *self.shown.get(&object)? else { return None };
         let channel = self.list.get_mut(index)?;
         let data_type = objects.spec(object)?.data_type;
         let raw = channel.filtered(time);
@@ -172,7 +172,7 @@ impl Channels {
     }
 
     fn value_of(&self, objects: &Objects, object: ObjectId) -> Option<(&Channel, DataType)> {
-        let (index, Shows::Value) = *self.shown.get(&object)? else { return None };
+        let (index, ObjectContent::Value) = *self.shown.get(&object)? else { return None };
         Some((self.list.get(index)?, objects.spec(object)?.data_type))
     }
 
@@ -305,24 +305,24 @@ impl Channel {
     }
 
     /// The objects that contain a value of this channel.
-    fn shown(&self, objects: &Objects, alone: bool) -> Vec<(ObjectId, Shows)> {
+    fn shown(&self, objects: &Objects, alone: bool) -> Vec<(ObjectId, ObjectContent)> {
         let sub = self.signal.channel;
-        let mut shown: Vec<(ObjectId, Shows)> = Vec::new();
+        let mut shown: Vec<(ObjectId, ObjectContent)> = Vec::new();
         for family in FAMILIES {
-            shown.push((ObjectId::new(family | 0x130, sub), Shows::Value));
-            shown.push((ObjectId::new(family | 0x140, sub), Shows::Net));
-            shown.push((ObjectId::new(family | 0x100, sub), Shows::Field));
+            shown.push((ObjectId::new(family | 0x130, sub), ObjectContent::Value));
+            shown.push((ObjectId::new(family | 0x140, sub), ObjectContent::Net));
+            shown.push((ObjectId::new(family | 0x100, sub), ObjectContent::Field));
         }
-        shown.push((self.signal.value, Shows::Value));
-        shown.extend(self.signal.also.iter().map(|object| (*object, Shows::Value)));
-        shown.extend(self.signal.status.map(|object| (object, Shows::Status)));
+        shown.push((self.signal.value, ObjectContent::Value));
+        shown.extend(self.signal.also.iter().map(|object| (*object, ObjectContent::Value)));
+        shown.extend(self.signal.status.map(|object| (object, ObjectContent::Status)));
         // These two objects are manufacturer-specific: they have fixed names, but no fixed indices. A device with one
         // channel may have them without sub-indices.
         let mine = |object: &ObjectId| object.sub == sub || (object.sub == 0 && alone);
         shown.extend(objects.specs().filter(|(object, _)| mine(object)).filter_map(|(object, spec)| {
             match spec.name.as_str() {
-                "minimum-pv" => Some((object, Shows::Lowest)),
-                "maximum-pv" => Some((object, Shows::Highest)),
+                "minimum-pv" => Some((object, ObjectContent::Lowest)),
+                "maximum-pv" => Some((object, ObjectContent::Highest)),
                 _ => None,
             }
         }));
@@ -330,23 +330,23 @@ impl Channel {
         shown
     }
 
-    fn read(&mut self, objects: &Objects, shows: Shows, data_type: DataType, time: Duration) -> Vec<u8> {
+    fn read(&mut self, objects: &Objects, shows: ObjectContent, data_type: DataType, time: Duration) -> Vec<u8> {
         let raw = self.filtered(time);
         let (low, high) = self.seen.unwrap_or((raw, raw));
         let (low, high) = (low.min(raw), high.max(raw));
         self.seen = Some((low, high));
         let overload = self.quantity.overload(time);
         match shows {
-            Shows::Value if overload.is_some() && self.signal.marker => marker(data_type),
-            Shows::Value => self.encode(objects, data_type, raw),
-            Shows::Net => {
+            ObjectContent::Value if overload.is_some() && self.signal.marker => marker(data_type),
+            ObjectContent::Value => self.encode(objects, data_type, raw),
+            ObjectContent::Net => {
                 let tare = self.tare_object(objects).and_then(|object| self.pv(objects, object)).unwrap_or(0.0);
                 number::to_bytes(self.scaled(objects, data_type, self.value(objects, raw) - tare), data_type)
             }
-            Shows::Lowest => self.encode(objects, data_type, low),
-            Shows::Highest => self.encode(objects, data_type, high),
-            Shows::Status => number::to_bytes(self.status(overload), data_type),
-            Shows::Field => {
+            ObjectContent::Lowest => self.encode(objects, data_type, low),
+            ObjectContent::Highest => self.encode(objects, data_type, high),
+            ObjectContent::Status => number::to_bytes(self.status(overload), data_type),
+            ObjectContent::Field => {
                 let channel = self.quantity.channel();
                 let [start, end] = channel.field.unwrap_or([0.0, 10_000.0]);
                 let part = (self.quantity.at(time) - channel.start) / (channel.end - channel.start);

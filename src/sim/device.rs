@@ -26,9 +26,9 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 /// Duration of a reset of the node.
-const RESTART: Duration = Duration::from_millis(100);
+const NODE_RESET_TIME: Duration = Duration::from_millis(100);
 /// Duration of a reset of the communication.
-const RECONNECT: Duration = Duration::from_millis(10);
+const COMMUNICATION_RESET_TIME: Duration = Duration::from_millis(10);
 
 const COB_ID_SYNC: ObjectId = ObjectId::new(0x1005, 0);
 const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
@@ -237,7 +237,7 @@ impl Device {
         self.memory.settings.reset();
         self.restart(area);
         let goes_offline = self.setup.oddities.offline_after.contains(&OfflineAfter::Reset);
-        let reset_time = if area == Area::All { RESTART } else { RECONNECT };
+        let reset_time = if area == Area::All { NODE_RESET_TIME } else { COMMUNICATION_RESET_TIME };
         self.phase = if goes_offline { Phase::Off } else { Phase::Starting(now + reset_time) };
     }
 

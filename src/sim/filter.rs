@@ -13,7 +13,7 @@ const CONSTANT: u16 = 0x61a1;
 /// average (MC1609, 2.2, Filter).
 const MAX_LENGTH: Duration = Duration::from_millis(1000);
 /// A moving average no longer depends on samples older than this multiple of its constant.
-const FORGOTTEN: u64 = 40;
+const MEMORY_FACTOR: u64 = 40;
 
 /// How samples are combined into one value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +115,7 @@ impl Filter {
     /// Skips the samples of a long pause that do not change the value.
     fn skip(&mut self, present: u64, longest: u64) {
         let missing = present.saturating_sub(self.next);
-        let window = self.constant.saturating_mul(FORGOTTEN);
+        let window = self.constant.saturating_mul(MEMORY_FACTOR);
         match self.kind {
             Kind::Moving if missing > window => {
                 self.next = present - window;

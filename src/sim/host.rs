@@ -10,10 +10,10 @@ use crate::sim::Device;
 use std::time::Duration;
 
 /// The wait if the bus accepts no more frames.
-const FULL: Duration = Duration::from_millis(1);
+const QUEUE_RETRY_INTERVAL: Duration = Duration::from_millis(1);
 
 /// The longest single wait. The value is not critical.
-const IDLE: Duration = Duration::from_secs(3600);
+const MAX_WAIT: Duration = Duration::from_secs(3600);
 
 /// Runs stations on `bus` until the user asks to stop, or until `until`.
 ///
@@ -39,12 +39,12 @@ pub fn run(
         let now = bus.now().mono;
         host.wake(now);
         let full = !host.send(bus)?;
-        let next = host.next_wake().unwrap_or(now + IDLE);
-        let next = if full { next.min(now + FULL) } else { next };
+        let next = host.next_wake().unwrap_or(now + MAX_WAIT);
+        let next = if full { next.min(now + QUEUE_RETRY_INTERVAL) } else { next };
         let deadline = until.map_or(next, |until| until.min(next));
         match bus.receive(deadline)? {
-            Event::Frame(received) => host.hear(None, received.at.mono, &received.frame),
-            Event::Interrupted if console.as_mut().is_some_and(|console| host.obey(console, bus.mono())) => {}
+            Event::Frame(received) => host.deliver(None, received.at.mono, &received.frame),
+            Event::Interrupted if console.as_mut().is_some_and(|console| host.execute_line(console, bus.mono())) => {}
             Event::Interrupted | Event::Ended => break,
             Event::Timeout if until.is_some_and(|until| bus.now().mono >= until) => break,
             Event::Link(true) => host.retime(bus.bit_rate()),
@@ -74,7 +74,7 @@ impl Host {
     }
 
     /// Executes the line that came with an interrupt; `false` if there is none: the user asks to stop.
-    fn obey(&mut self, console: &mut Console<'_>, now: Mono) -> bool {
+    fn execute_line(&mut self, console: &mut Console<'_>, now: Mono) -> bool {
         let Ok(line) = console.lines.try_recv() else { return false };
         if let Err(why) = self.execute(&line, now) {
             (console.refuse)(&format!("\"{}\": {why}", line.escape_debug()));
@@ -132,7 +132,7 @@ impl Host {
     }
 
     /// Delivers a frame to every station except its sender.
-    fn hear(&mut self, sender: Option<usize>, now: Mono, frame: &Frame) {
+    fn deliver(&mut self, sender: Option<usize>, now: Mono, frame: &Frame) {
         for index in 0..self.places.len() {
             if sender != Some(index) && self.is_on_the_bus(&*self.places[index].0) {
                 let (station, out) = &mut self.places[index];
@@ -162,7 +162,7 @@ impl Host {
             let (station, out) = &mut self.places[index];
             out.pop();
             station.sent(now, &frame);
-            self.hear(Some(index), now, &frame);
+            self.deliver(Some(index), now, &frame);
         }
     }
 }
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn device_at_another_bit_rate_neither_receives_nor_sends() {
-        // LSS switches to 125 kbit/s. Then follow a request at 250 kbit/s and the time of a heartbeat.
+        // LSS switches to 125 kbit/s. Then a request follows at 250 kbit/s and the time of a heartbeat.
         let configure = ["7E5#0401000000000000", "7E5#1300040000000000", "7E5#1500000000000000"];
         let mut plan = vec![(1, "605#2B17100064000000")];
         plan.extend(configure.iter().zip([10, 20, 30]).map(|(frame, at)| (at, *frame)));

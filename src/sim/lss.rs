@@ -33,12 +33,12 @@ pub(super) struct Slave {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Reply {
     pub(super) answer: Option<[u8; 8]>,
-    pub(super) then: Then,
+    pub(super) then: DeviceAction,
 }
 
 /// The action of the device after a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Then {
+pub(super) enum DeviceAction {
     #[default]
     Nothing,
     /// The device was unconfigured and now has a node-ID.
@@ -51,10 +51,10 @@ impl Reply {
     fn with(bytes: &[u8]) -> Reply {
         let mut answer = [0; 8];
         answer.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
-        Reply { answer: Some(answer), then: Then::Nothing }
+        Reply { answer: Some(answer), then: DeviceAction::Nothing }
     }
 
-    fn then(then: Then) -> Reply {
+    fn then(then: DeviceAction) -> Reply {
         Reply { answer: None, then }
     }
 }
@@ -98,7 +98,9 @@ impl Slave {
             }
             0x11 => Reply::with(&[service, u8::from(!settings.configure_node(first))]),
             0x13 => Reply::with(&[service, u8::from(first != 0 || !settings.configure_rate(second))]),
-            0x15 => Reply::then(Then::Activate(Duration::from_millis(u16::from_le_bytes([first, second]).into()))),
+            0x15 => {
+                Reply::then(DeviceAction::Activate(Duration::from_millis(u16::from_le_bytes([first, second]).into())))
+            }
             0x17 => {
                 settings.persistent = settings.pending;
                 Reply::with(&[service])
@@ -118,7 +120,7 @@ impl Slave {
             0 if self.is_configuring => {
                 self.is_configuring = false;
                 if settings.active.node.is_none() && settings.pending.node.is_some() {
-                    return Reply::then(Then::Boot);
+                    return Reply::then(DeviceAction::Boot);
                 }
             }
             1 => self.is_configuring = true,

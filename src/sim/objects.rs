@@ -174,7 +174,7 @@ impl Objects {
 
     /// Restores the factory default of an object.
     pub(super) fn put_default(&mut self, object: ObjectId, node: NodeId) {
-        if let Some(value) = self.spec(object).map(|spec| spec.delivered(node)) {
+        if let Some(value) = self.spec(object).map(|spec| spec.factory_default(node)) {
             self.values.insert(object, value);
         }
     }
@@ -248,7 +248,7 @@ impl Objects {
     /// Resets the working values to the stored ones, else to the factory defaults.
     pub(super) fn reset(&mut self, area: Area, node: NodeId) {
         for (object, spec) in self.specs.iter().filter(|(object, _)| area.holds(**object)) {
-            let value = self.saved.get(object).cloned().unwrap_or_else(|| spec.delivered(node));
+            let value = self.saved.get(object).cloned().unwrap_or_else(|| spec.factory_default(node));
             self.values.insert(*object, value);
         }
     }
@@ -263,7 +263,7 @@ impl Objects {
             }
             let reset = self.resets_cob_ids && group == Group::All && is_cob_id(*object);
             match self.values.get(object).filter(|_| !reset) {
-                Some(value) if *value != spec.delivered(node) => self.saved.insert(*object, value.clone()),
+                Some(value) if *value != spec.factory_default(node) => self.saved.insert(*object, value.clone()),
                 _ => self.saved.remove(object),
             };
         }
@@ -353,7 +353,7 @@ impl Spec {
     }
 
     /// The factory default; zeros or empty text if the description has none.
-    fn delivered(&self, node: NodeId) -> Vec<u8> {
+    fn factory_default(&self, node: NodeId) -> Vec<u8> {
         let described = self.default.as_ref().and_then(|default| default.encode(self.data_type, node).ok());
         described.unwrap_or_else(|| vec![0; self.data_type.width().unwrap_or(0)])
     }

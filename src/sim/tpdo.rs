@@ -33,7 +33,7 @@ pub(super) struct Tpdo {
     held_back: Option<Mono>,
     watches: Vec<Watch>,
     /// The next time to compare the values that can cause an event.
-    look: Option<Mono>,
+    compare_at: Option<Mono>,
 }
 
 /// A mapped value whose change can cause an event (CiA 404: x133h to x136h).
@@ -78,7 +78,7 @@ impl Tpdo {
             timer: None,
             held_back: None,
             watches: Vec::new(),
-            look: None,
+            compare_at: None,
         }
     }
 
@@ -140,7 +140,7 @@ impl Tpdo {
                 self.watches.extend(Watch::new(objects, channels, object, now.since_start()));
             }
         }
-        self.plan_look(objects, channels, now);
+        self.schedule_comparison(objects, channels, now);
     }
 
     /// Called when the node leaves OPERATIONAL.
@@ -148,9 +148,9 @@ impl Tpdo {
         *self = Tpdo::new(self.number, self.style);
     }
 
-    fn plan_look(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
+    fn schedule_comparison(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         let next = |watch: &Watch| channels.next_sample(objects, watch.object, now.since_start());
-        self.look = self.watches.iter().filter_map(next).min().map(Mono::at);
+        self.compare_at = self.watches.iter().filter_map(next).min().map(Mono::at);
     }
 
     /// Handles a SYNC. Returns the cause if the TPDO must be sent.
@@ -168,11 +168,11 @@ impl Tpdo {
     /// Handles the time `now`. Returns the cause if the event timer or an event triggers a transmission.
     pub(super) fn wake(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) -> Option<Cause> {
         let mut event = self.held_back.is_some_and(|due| due <= now);
-        if self.look.is_some_and(|due| due <= now) {
+        if self.compare_at.is_some_and(|due| due <= now) {
             for watch in &mut self.watches {
-                event |= watch.look(objects, channels, now.since_start());
+                event |= watch.compare(objects, channels, now.since_start());
             }
-            self.plan_look(objects, channels, now);
+            self.schedule_comparison(objects, channels, now);
         }
         event |= self.timer.is_some_and(|due| due <= now);
         if !event {
@@ -189,7 +189,7 @@ impl Tpdo {
 
     /// The next time at which [`Tpdo::wake`] must be called.
     pub(super) fn next_wake(&self) -> Option<Mono> {
-        [self.timer, self.held_back, self.look].into_iter().flatten().min()
+        [self.timer, self.held_back, self.compare_at].into_iter().flatten().min()
     }
 
     /// Records a transmission. Returns `false` if nothing is sent because nothing changed.
@@ -241,7 +241,7 @@ impl Watch {
     }
 
     /// Whether the value changed by the delta, or left the range between the limits since the last call.
-    fn look(&mut self, objects: &Objects, channels: &mut Channels, time: Duration) -> bool {
+    fn compare(&mut self, objects: &Objects, channels: &mut Channels, time: Duration) -> bool {
         let Some(value) = channels.number(objects, self.object, time) else { return false };
         let mut event = self.delta > 0.0 && (value - self.reference).abs() >= self.delta;
         if let Some((lower, upper)) = self.limits {

@@ -15,7 +15,7 @@ mod samples;
 
 pub use failure::{AutozeroEffect, AutozeroFact, AutozeroFailure, OffsetChange, Proof, Quantity, Undo};
 
-pub use safety::{Limit, Objection};
+pub use safety::{FailedCheck, Limit};
 
 use crate::canopen::id::NodeId;
 use crate::device::description::StoreGroup;
@@ -234,15 +234,15 @@ impl<'a> Procedure<'a> {
             before: &self.before,
             offset: self.offsets.first().map(|offset| offset.number.as_f64()),
         };
-        let mut objections = measured.objections(self.limits.as_ref());
-        objections.retain(|objection| options.target == ZeroTarget::Autozero || objection.concerns_tare());
-        if objections.is_empty() || options.force {
-            let forced = |objection| Note::of_node(node, AutozeroFact::Forced(objection));
-            return Ok(objections.into_iter().map(forced).collect());
+        let mut failed_checks = measured.failed_checks(self.limits.as_ref());
+        failed_checks.retain(|failed_check| options.target == ZeroTarget::Autozero || failed_check.concerns_tare());
+        if failed_checks.is_empty() || options.force {
+            let forced = |failed_check| Note::of_node(node, AutozeroFact::Forced(failed_check));
+            return Ok(failed_checks.into_iter().map(forced).collect());
         }
         let cause = AutozeroFailure::Unsafe {
             target: options.target,
-            objection: objections.swap_remove(0),
+            failed_check: failed_checks.swap_remove(0),
             channel: options.channel,
         };
         Err(Failure::at(node, cause))

@@ -109,7 +109,7 @@ impl Cause {
             },
             Cause::Sdo(error) => match error.failure {
                 SdoFailure::Refused(_) => Kind::Refused,
-                SdoFailure::NoAnswer { .. } | SdoFailure::Overtime(_) => Kind::NoAnswer,
+                SdoFailure::NoAnswer { .. } | SdoFailure::TimeLimit(_) => Kind::NoAnswer,
                 SdoFailure::NotWritten(_) => Kind::CheckFailed,
                 SdoFailure::Violation(..)
                 | SdoFailure::WrongLength { .. }

@@ -20,7 +20,7 @@ const PAIRS: u32 = 3;
 const PAIR_PART: u32 = 4;
 
 /// A second sender of a TPDO is detected within this number of SYNC messages of another node.
-const SETTLED_SYNCS: u64 = FOREIGN_TOLERANCE + 2;
+const SYNCS_TO_DECIDE: u64 = FOREIGN_TOLERANCE + 2;
 
 /// A TPDO that arrived without a SYNC for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,8 +86,8 @@ impl SyncedTpdo {
     }
 
     /// Whether enough SYNC messages were received to detect a second sender.
-    fn is_settled(&self) -> bool {
-        self.last.is_none() || self.syncs >= self.every.map_or(u64::from(PAIRS) + 1, |every| every * SETTLED_SYNCS)
+    fn is_decided(&self) -> bool {
+        self.last.is_none() || self.syncs >= self.every.map_or(u64::from(PAIRS) + 1, |every| every * SYNCS_TO_DECIDE)
     }
 }
 
@@ -153,13 +153,13 @@ impl SyncedTpdos {
 
     /// Whether this TPDO may still have a second sender that is not detected yet. This is so only if another node may
     /// send SYNC.
-    pub(super) fn is_open(&self, id: CanId) -> bool {
-        !self.is_producer && self.tpdos.get(&id).is_some_and(|tpdo| !tpdo.is_settled())
+    pub(super) fn may_have_second_sender(&self, id: CanId) -> bool {
+        !self.is_producer && self.tpdos.get(&id).is_some_and(|tpdo| !tpdo.is_decided())
     }
 
     /// Whether enough SYNC messages were received to detect a second sender of each received TPDO.
-    pub(super) fn is_settled(&self) -> bool {
-        self.is_producer || self.tpdos.values().all(SyncedTpdo::is_settled)
+    pub(super) fn is_decided(&self) -> bool {
+        self.is_producer || self.tpdos.values().all(SyncedTpdo::is_decided)
     }
 
     /// Frames were lost, perhaps SYNC messages.

@@ -230,7 +230,7 @@ fn all_transfers_together_end_with_their_time() {
     master.limit_transfers(Some(time));
     let requests = [0x2000, 0x2001].map(|index| Request::read(node(), ObjectId::new(index, 0))).to_vec();
     for result in master.transfer(requests, &mut |_| {}).expect("the bus works") {
-        assert_eq!(result.expect_err("too slow").failure, SdoFailure::Overtime(time));
+        assert_eq!(result.expect_err("too slow").failure, SdoFailure::TimeLimit(time));
     }
     assert!(master.now().since_start() < Duration::from_millis(600));
 }

@@ -173,7 +173,7 @@ impl MemoryBus {
     }
 
     /// The time of the next event, not before the present time.
-    fn next_happening(&self) -> Option<Mono> {
+    fn next_event_time(&self) -> Option<Mono> {
         let wire = match &self.wire {
             Wire::Busy(transmission) => Some(transmission.complete),
             Wire::Free(from) => self.contenders().map(|(ready, ..)| ready.max(*from)).min(),
@@ -190,7 +190,7 @@ impl MemoryBus {
     /// Processes the next event up to `limit`, and stops when the program has an event to receive. `true` if there may
     /// be more.
     fn step(&mut self, limit: Mono) -> bool {
-        let Some(moment) = self.next_happening().filter(|moment| *moment <= limit) else { return false };
+        let Some(moment) = self.next_event_time().filter(|moment| *moment <= limit) else { return false };
         self.now = moment;
         if self.interrupts.first().is_some_and(|due| *due <= moment) {
             self.interrupts.pop_first();
@@ -321,7 +321,7 @@ impl Bus for MemoryBus {
             if let Some(event) = self.inbox.pop_front() {
                 return Ok(event);
             }
-            let next = self.next_happening().filter(|moment| *moment <= deadline);
+            let next = self.next_event_time().filter(|moment| *moment <= deadline);
             match (host_now, next) {
                 (None, Some(_)) => {
                     self.step(deadline);

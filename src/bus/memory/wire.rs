@@ -96,7 +96,7 @@ impl MemoryBus {
             Tuning::Off => None,
         };
         // For each station that does not send: whether it receives at this bit rate or disturbs the frame.
-        let hearing: Vec<Option<bool>> = self
+        let receiving: Vec<Option<bool>> = self
             .places
             .iter()
             .enumerate()
@@ -104,14 +104,14 @@ impl MemoryBus {
             .collect();
         let takes_part = self.mode == Mode::Normal && self.controller.level() < Level::Off;
         let program = (!transmission.has(Sender::Program)).then_some(self.bit_rate == bit_rate);
-        let acknowledged = program == Some(true) && takes_part || hearing.contains(&Some(true));
+        let acknowledged = program == Some(true) && takes_part || receiving.contains(&Some(true));
         let disturbed = transmission.collides()
             || program == Some(false) && takes_part && self.controller.disturbs()
             || self
                 .places
                 .iter()
-                .zip(&hearing)
-                .any(|(place, hears)| *hears == Some(false) && place.controller.disturbs());
+                .zip(&receiving)
+                .any(|(place, receives)| *receives == Some(false) && place.controller.disturbs());
         let outcome = match (acknowledged, disturbed) {
             (_, true) => Outcome::Disturbed,
             (false, false) => Outcome::Unacknowledged,
@@ -134,14 +134,14 @@ impl MemoryBus {
         if after != before {
             self.inbox.push_back(Event::Fault(after.fault(), self.stamp(self.now)));
         }
-        for (place, hears) in self.places.iter_mut().zip(&hearing) {
-            if let Some(hears) = hears {
-                place.controller.received(*hears && outcome == Outcome::Delivered);
+        for (place, receives) in self.places.iter_mut().zip(&receiving) {
+            if let Some(receives) = receives {
+                place.controller.received(*receives && outcome == Outcome::Delivered);
             }
         }
         if outcome == Outcome::Delivered {
             self.heard_rate = bit_rate;
-            self.deliver(transmission, &hearing);
+            self.deliver(transmission, &receiving);
         } else {
             self.requeue(transmission, outcome);
         }
@@ -154,7 +154,7 @@ impl MemoryBus {
     }
 
     /// Delivers the frame to all receivers and reports it as sent to its senders.
-    fn deliver(&mut self, transmission: &Transmission, hearing: &[Option<bool>]) {
+    fn deliver(&mut self, transmission: &Transmission, receiving: &[Option<bool>]) {
         let Some((_, frame)) = transmission.senders.first() else { return };
         let is_heard = transmission.bit_rate == self.bit_rate && !transmission.has(Sender::Program);
         if is_heard && self.filters.wants(frame) {
@@ -167,12 +167,12 @@ impl MemoryBus {
             };
             controller.waits_until = None;
         }
-        for (index, (place, hears)) in self.places.iter_mut().zip(hearing).enumerate() {
+        for (index, (place, receives)) in self.places.iter_mut().zip(receiving).enumerate() {
             if transmission.has(Sender::Station(index)) {
                 place.controller.transmitted(Outcome::Delivered);
                 place.station.sent(self.now, frame);
                 place.update();
-            } else if *hears == Some(true) {
+            } else if *receives == Some(true) {
                 place.station.receive(self.now, frame, &mut place.out);
                 place.update();
             }

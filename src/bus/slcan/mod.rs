@@ -29,7 +29,7 @@ const QUIET_TIME: Duration = Duration::from_millis(60);
 /// The longest wait for an answer to a command.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(300);
 /// The time between commands to an adapter that does not answer.
-const BLIND_INTERVAL: Duration = Duration::from_millis(30);
+const UNANSWERED_COMMAND_INTERVAL: Duration = Duration::from_millis(30);
 /// The interval of attempts to send a rejected frame.
 const RETRY_INTERVAL: Duration = Duration::from_millis(5);
 /// A frame is dropped after this number of rejections.
@@ -227,7 +227,7 @@ impl Slcan {
                 }
                 self.pending = Some(Pending::Step(step));
                 self.write(&step.command(), out);
-                self.due = Some(now.mono + if self.answers { ANSWER_TIMEOUT } else { BLIND_INTERVAL });
+                self.due = Some(now.mono + if self.answers { ANSWER_TIMEOUT } else { UNANSWERED_COMMAND_INTERVAL });
             } else if self.flags.is_some() && self.next_flags <= now.mono {
                 self.steps.push_back(Step::Flags);
             } else if let Some(frame) = self.queue.front().copied() {

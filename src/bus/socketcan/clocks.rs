@@ -6,7 +6,7 @@ use std::time::Duration;
 /// The time for which a comparison of the clocks is valid. The clocks drift apart by less than 1 ms in this time.
 const COMPARE_EVERY: Duration = Duration::from_secs(1);
 /// The longest time between two readings for a good comparison.
-const CLOSE: Duration = Duration::from_micros(100);
+const MAX_READING_GAP: Duration = Duration::from_micros(100);
 /// The inaccuracy caused by successive readings and drift.
 const JITTER: Duration = Duration::from_millis(1);
 
@@ -68,7 +68,7 @@ impl Clocks {
             if apart < best.1 {
                 best = (first, apart);
             }
-            if apart < CLOSE {
+            if apart < MAX_READING_GAP {
                 break;
             }
             first = second;

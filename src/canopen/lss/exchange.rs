@@ -83,7 +83,7 @@ impl Exchange {
 
     /// Whether more than one slave answered: the answers differ, or there were more answers than requests. If all
     /// slaves answer the service with the same frame, only different answers count.
-    pub fn is_crowded(&self) -> bool {
+    pub fn has_several_slaves(&self) -> bool {
         self.heard.len() > 1 || self.count > self.asked
     }
 
@@ -99,7 +99,7 @@ impl Exchange {
     /// No answer, several slaves, a rejection, or a protocol violation.
     pub fn one(&self) -> Result<Answer, ExchangeError> {
         let Some(&(frame, answer)) = self.heard.first() else { return Err(ExchangeError::NoAnswer) };
-        if self.is_crowded() && !self.service.has_common_answer() {
+        if self.has_several_slaves() && !self.service.has_common_answer() {
             return Err(ExchangeError::Several(self.heard.iter().map(|(frame, _)| *frame).collect()));
         }
         match answer.map_err(|violation| ExchangeError::Violation(violation, frame))? {
@@ -161,6 +161,6 @@ mod tests {
             let [a, b, c, d] = number.to_le_bytes();
             exchange.on_frame(&Frame::full(crate::canopen::id::CanId::LSS_SLAVE, [0x5d, a, b, c, d, 0, 0, 0]));
         }
-        assert_eq!((exchange.answers().len(), exchange.is_crowded()), (KEPT, true));
+        assert_eq!((exchange.answers().len(), exchange.has_several_slaves()), (KEPT, true));
     }
 }

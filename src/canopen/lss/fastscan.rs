@@ -171,13 +171,13 @@ impl Fastscan {
         match self.phase {
             Phase::AllSlaves if answered => {
                 if self.has_passed_probe {
-                    self.look_at(Part::Vendor);
+                    self.start_part(Part::Vendor);
                 } else {
                     self.phase = Phase::Probe;
                 }
             }
             Phase::AllSlaves if self.retries > 0 => self.retries -= 1,
-            Phase::AllSlaves if self.restarts > 0 => return self.unsettled(),
+            Phase::AllSlaves if self.restarts > 0 => return self.contradiction(),
             Phase::AllSlaves => return Progress::NoneFound,
             Phase::Probe if answered => {
                 self.probe_answers += 1;
@@ -187,7 +187,7 @@ impl Fastscan {
             }
             Phase::Probe => {
                 self.has_passed_probe = true;
-                self.look_at(Part::Vendor);
+                self.start_part(Part::Vendor);
             }
             Phase::Bit(bit) => {
                 if !answered {
@@ -206,14 +206,14 @@ impl Fastscan {
                 let Some(next) = Part::from_number(self.part.number() + 1) else {
                     return Progress::Found(LssAddress::new(self.known.map(Option::unwrap_or_default)));
                 };
-                self.look_at(next);
+                self.start_part(next);
             }
             Phase::Advance => {
                 // It is unknown whether the slave continued: restart, and check the numbers found so far in one step
                 // each.
                 self.restarts += 1;
                 if self.restarts > RESTARTS {
-                    return self.unsettled();
+                    return self.contradiction();
                 }
                 if self.known[usize::from(self.part.number())].take().is_some() {
                     self.known = [None; 4];
@@ -231,7 +231,7 @@ impl Fastscan {
         self.has_missed_answers = false;
         self.tries += 1;
         if self.tries >= TRIES {
-            return self.unsettled();
+            return self.contradiction();
         }
         self.extensions += 1;
         if self.tries % 2 == 1 {
@@ -246,7 +246,7 @@ impl Fastscan {
         Progress::Continue
     }
 
-    fn look_at(&mut self, part: Part) {
+    fn start_part(&mut self, part: Part) {
         self.part = part;
         self.tries = 0;
         match self.known[usize::from(part.number())] {
@@ -263,7 +263,7 @@ impl Fastscan {
         self.phase = Phase::Bit(31);
     }
 
-    fn unsettled(&self) -> Progress {
+    fn contradiction(&self) -> Progress {
         Progress::Failed(FastscanError::Unsettled(self.part))
     }
 }

@@ -29,7 +29,7 @@ pub struct BlockUpload {
     /// The number of bytes missing in the frame of the last segment.
     missing: usize,
     /// Consecutive blocks without progress or without an end.
-    setbacks: u8,
+    blocks_without_progress: u8,
     /// Whether segments were repeated.
     disturbed: bool,
     /// The limit for the size of the object in bytes.
@@ -74,7 +74,7 @@ impl BlockUpload {
             announced: None,
             crc: false,
             missing: 0,
-            setbacks: 0,
+            blocks_without_progress: 0,
             disturbed: false,
             limit: LONGEST,
             plain: Upload::new(node, object, accept_60),
@@ -135,7 +135,9 @@ impl BlockUpload {
         };
         match self.state {
             State::Initiated => self.initiated(head, frame, out),
-            State::SubBlock { taken: 0, highest: 0, acknowledged: 0, .. } if self.is_end_of_nothing(head, frame) => {
+            State::SubBlock { taken: 0, highest: 0, acknowledged: 0, .. }
+                if self.is_end_of_empty_object(head, frame) =>
+            {
                 self.end(head, None, frame, out)
             }
             State::SubBlock { .. } => self.segment(head, frame, out),
@@ -152,8 +154,8 @@ impl BlockUpload {
             // is right in both cases only if the last one was 0.
             let unambiguous = taken > 0 || acknowledged == 0;
             let provable = self.crc || self.announced.is_some();
-            if unambiguous && provable && self.setbacks < MAX_STALLED_BLOCKS {
-                self.setbacks += 1;
+            if unambiguous && provable && self.blocks_without_progress < MAX_STALLED_BLOCKS {
+                self.blocks_without_progress += 1;
                 self.disturbed = true;
                 self.acknowledge(taken, None, out);
                 return None;
@@ -225,8 +227,8 @@ impl BlockUpload {
             self.state = State::Acknowledged { closing: *frame };
         } else if is_last || sequence == self.block_size.get() {
             self.disturbed |= !in_order;
-            self.setbacks = if taken > 0 { 0 } else { self.setbacks + 1 };
-            if self.setbacks > MAX_STALLED_BLOCKS {
+            self.blocks_without_progress = if taken > 0 { 0 } else { self.blocks_without_progress + 1 };
+            if self.blocks_without_progress > MAX_STALLED_BLOCKS {
                 return self.fail(Violation::Stuck, frame, out);
             }
             self.acknowledge(taken, Some(*frame), out);
@@ -245,7 +247,7 @@ impl BlockUpload {
     }
 
     /// Whether this is the end frame of an object of 0 bytes. Some servers omit the empty segment before it.
-    fn is_end_of_nothing(&self, head: u8, frame: &Frame) -> bool {
+    fn is_end_of_empty_object(&self, head: u8, frame: &Frame) -> bool {
         let is_empty = self.announced == Some(0) || self.announced.is_none() && self.crc;
         is_empty && head & 0xe1 == 0xc1 && frame.data()[1..].iter().all(|&byte| byte == 0)
     }
@@ -253,7 +255,7 @@ impl BlockUpload {
     fn end(&mut self, head: u8, closing: Option<Frame>, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
         let data = frame.data();
         let unused = usize::from(head >> 2 & 7);
-        let misnamed = self.is_full_by_proof(unused, data);
+        let misnamed = self.is_last_segment_full(unused, data);
         let length = if misnamed { self.bytes.len() } else { self.bytes.len().saturating_sub(unused) };
         let expected = if self.crc { crc16(&self.bytes[..length]) } else { 0 };
         let [low, high] = expected.to_le_bytes();
@@ -284,7 +286,7 @@ impl BlockUpload {
 
     /// Whether an end frame wrongly declares the whole last segment invalid, although the announced size and the CRC
     /// include it. durand 0.5.0 does this if the size is a multiple of seven bytes.
-    fn is_full_by_proof(&self, unused: usize, end: &[u8]) -> bool {
+    fn is_last_segment_full(&self, unused: usize, end: &[u8]) -> bool {
         let announced = self.announced.is_some_and(|size| usize::try_from(size) == Ok(self.bytes.len()));
         let given = matches!(end, [_, low, high, ..] if u16::from_le_bytes([*low, *high]) == crc16(&self.bytes));
         unused == 7 && self.missing == 0 && !self.bytes.is_empty() && announced && self.crc && given

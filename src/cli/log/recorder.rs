@@ -8,7 +8,7 @@ use crate::canopen::id::NodeId;
 use crate::measure::sample::{Sample, Source};
 use crate::node::Node;
 use crate::output::console::Console;
-use crate::output::events::{EventText, Events, Weight, event_text, file_change_text};
+use crate::output::events::{EventText, Events, Severity, event_text, file_change_text};
 use crate::output::failure::ErrorMessage;
 use crate::output::live::LiveCounts;
 use crate::output::progress::Progress;
@@ -108,7 +108,7 @@ impl Recorder {
     }
 
     fn warn(&mut self, event: &'static str, text: String, at: Stamp) {
-        self.put_event(&EventText::of_all(event, Weight::Warning, text), at);
+        self.put_event(&EventText::of_all(event, Severity::Warning, text), at);
     }
 
     fn put(&mut self, cycle: Option<u64>, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {

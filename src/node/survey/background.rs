@@ -1,6 +1,6 @@
 //! Reads one node again in the background, for example after it restarted during a recording.
 
-use super::{Ask, Overrides, survey_nodes};
+use super::{ObjectReader, Overrides, survey_nodes};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::device::quirk::Quirk;
@@ -21,7 +21,7 @@ pub struct BackgroundSurvey {
     /// The number of consecutive objects without an answer until now.
     silent: u8,
     /// Whether the survey fails if an object that was answered before has no valid answer now.
-    insists: bool,
+    requires_known_objects: bool,
     /// The optional objects without a valid answer.
     unknown: BTreeSet<ObjectId>,
 }
@@ -46,10 +46,10 @@ struct Known<'a, 'bus> {
     master: &'a mut Master<'bus>,
 }
 
-impl Ask for Known<'_, '_> {
+impl ObjectReader for Known<'_, '_> {
     type Stop = Stop;
 
-    fn ask(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Stop> {
+    fn read_objects(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Stop> {
         let wanted = objects.iter().map(|(_, object)| *object).filter(|object| !self.answers.contains_key(object));
         let wanted: Vec<ObjectId> = wanted.collect();
         if wanted.is_empty() {
@@ -73,13 +73,19 @@ impl Ask for Known<'_, '_> {
 }
 
 impl BackgroundSurvey {
-    /// Starts to read `node` again. If it `insists`, an object that was answered before and has no valid answer now is
-    /// an error.
-    pub fn start(node: NodeId, overrides: &Overrides, insists: bool, master: &mut Master<'_>) -> BackgroundSurvey {
+    /// Starts to read `node` again. With `requires_known_objects`, an object that was answered before and has no valid
+    /// answer now is an error.
+    pub fn start(
+        node: NodeId,
+        overrides: &Overrides,
+        requires_known_objects: bool,
+        master: &mut Master<'_>,
+    ) -> BackgroundSurvey {
         let own = overrides.iter().filter(|(other, _)| **other == node);
         let overrides = own.map(|(&node, model)| (node, model.clone())).collect();
         let (answers, pending, unknown) = (BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
-        let mut survey = BackgroundSurvey { node, overrides, answers, pending, silent: 0, insists, unknown };
+        let mut survey =
+            BackgroundSurvey { node, overrides, answers, pending, silent: 0, requires_known_objects, unknown };
         // The first run has no answers: it only sends requests.
         let _ = survey.run(master);
         survey
@@ -141,7 +147,11 @@ impl BackgroundSurvey {
     fn no_longer_answered(&self, master: &mut Master<'_>) -> Option<SdoError> {
         let before = master.unknown_objects().remove(&self.node).unwrap_or_default();
         let error = |object| self.answers.get(object).and_then(|answer| answer.as_ref().err()).cloned();
-        let new = self.unknown.iter().filter(|object| self.insists && !before.contains(object)).find_map(error);
+        let new = self
+            .unknown
+            .iter()
+            .filter(|object| self.requires_known_objects && !before.contains(object))
+            .find_map(error);
         if new.is_none() {
             self.unknown.iter().for_each(|&object| master.add_unknown(self.node, object));
         }

@@ -1,6 +1,6 @@
 //! Measuring ranges, and overloads that only the error register reports.
 
-use super::{Ask, U8, unsigned};
+use super::{ObjectReader, U8, unsigned};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
 use crate::master::{Error, Master};
@@ -11,7 +11,7 @@ use crate::node::read::{Item, Reader};
 
 /// Reads the measuring ranges (6148h, 6149h) if a value depends on them. This is an integer of at most 24 bits, or a
 /// described signal without a status. A device with integers may have these objects as integers only (7148h to 9149h).
-pub(super) fn read_ranges<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
+pub(super) fn read_ranges<A: ObjectReader>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     read_family(reader, nodes, 0x6000, |_| true)?;
     for family in [0x9000, 0x8000, 0x7000] {
         let is_missing =
@@ -22,7 +22,7 @@ pub(super) fn read_ranges<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]
 }
 
 /// Reads the measuring ranges of some signals from the objects of a family (6xxxh to 9xxxh).
-fn read_family<A: Ask>(
+fn read_family<A: ObjectReader>(
     reader: &mut Reader<'_, A>,
     nodes: &mut [Node],
     family: u16,
@@ -102,7 +102,7 @@ pub fn narrow_values(master: &mut Master<'_>, node: &mut Node) -> Result<Vec<Nar
 }
 
 /// Reads the error registers (1001h) that report overloads.
-pub(super) fn read_overloads<A: Ask>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
+pub(super) fn read_overloads<A: ObjectReader>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let wanted: Vec<(usize, u8)> =
         nodes.iter().enumerate().filter_map(|(at, node)| Some((at, node.overload_register()?))).collect();
     let items: Vec<Item> = wanted.iter().map(|&(at, _)| (nodes[at].id, Node::ERROR_REGISTER, U8)).collect();

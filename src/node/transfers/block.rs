@@ -80,7 +80,7 @@ impl Block {
                 self.begin(head);
                 Step::Continue
             }
-            Phase::Segments if self.is_end_of_nothing(head, data) => self.on_end(head, frame),
+            Phase::Segments if self.is_end_of_empty_object(head, data) => self.on_end(head, frame),
             Phase::Segments => self.on_segment(head, frame),
             Phase::Acknowledged if head & 0xe1 == 0xc1 => self.on_end(head, frame),
             Phase::Acknowledged | Phase::Ended => Step::Stray,
@@ -170,7 +170,7 @@ impl Block {
     }
 
     /// Whether this is the end frame of an object of 0 bytes. Some servers omit the empty segment before it.
-    fn is_end_of_nothing(&self, head: u8, data: &[u8]) -> bool {
+    fn is_end_of_empty_object(&self, head: u8, data: &[u8]) -> bool {
         let is_empty = self.announced == Some(0) && self.bytes.is_empty() && self.segments.is_empty();
         is_empty && head & 0xe1 == 0xc1 && data[1..].iter().all(|&byte| byte == 0)
     }

@@ -1,6 +1,6 @@
 //! The text of the events of a recording.
 
-use super::{EventText, Weight};
+use super::{EventText, Severity};
 use crate::bus::time::format_duration;
 use crate::bus::{Fault, ReceiveBuffer};
 use crate::canopen::emcy::Emergency;
@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// The text of a recording's event.
 pub fn event_text(event: &LogEvent) -> EventText {
-    use Weight::{Detail, Note as Info, Warning};
+    use Severity::{Detail, Note as Info, Warning};
     let of_all = EventText::of_all;
     match event {
         LogEvent::Remark(remark) => of_all("remark", Warning, remark_text(remark)),
@@ -24,7 +24,7 @@ pub fn event_text(event: &LogEvent) -> EventText {
             of_node(*node, "emcy", Warning, format!("node {node}: {}", emergency_text(*emergency, meaning)))
         }
         LogEvent::Share(interval, share) => {
-            EventText { event: None, node: None, text: share_text(*interval, *share), weight: Info }
+            EventText { event: None, node: None, text: share_text(*interval, *share), severity: Info }
         }
         LogEvent::Restarted(node) => of_node(*node, "reboot", Warning, format!("node {node} restarted")),
         LogEvent::ReadAgain(node, changes) if changes.is_empty() => {
@@ -64,16 +64,16 @@ pub fn event_text(event: &LogEvent) -> EventText {
             let text = emergency_text(*emergency, meaning);
             of_node(*node, "emcy", Warning, format!("node {node}: {text}: {}", times_more(*count)))
         }
-        LogEvent::Fault(fault) => of_all("fault", fault_weight(*fault), fault.to_string()),
-        LogEvent::Buffer(buffer) => EventText { event: None, node: None, text: buffer_text(*buffer), weight: Detail },
+        LogEvent::Fault(fault) => of_all("fault", fault_severity(*fault), fault.to_string()),
+        LogEvent::Buffer(buffer) => EventText { event: None, node: None, text: buffer_text(*buffer), severity: Detail },
         LogEvent::Dropped(count) => of_all("dropped", Warning, format!("the kernel dropped {count} frames")),
         LogEvent::Link(true) => of_all("link-up", Info, "the interface is up again".to_owned()),
         LogEvent::Link(false) => of_all("link-down", Warning, "the interface went down; waiting for it".to_owned()),
     }
 }
 
-fn of_node(node: NodeId, event: &'static str, weight: Weight, text: String) -> EventText {
-    EventText { event: Some(event), node: Some(node), text, weight }
+fn of_node(node: NodeId, event: &'static str, severity: Severity, text: String) -> EventText {
+    EventText { event: Some(event), node: Some(node), text, severity }
 }
 
 fn changed_text(node: NodeId, changes: &[Change]) -> String {
@@ -112,11 +112,11 @@ fn emergency_text(emergency: Emergency, meaning: &str) -> String {
     format!("emergency {:04X}h, {meaning}", emergency.code)
 }
 
-fn fault_weight(fault: Fault) -> Weight {
+fn fault_severity(fault: Fault) -> Severity {
     match fault {
-        Fault::BusOff | Fault::ControllerOverflow => Weight::Warning,
-        Fault::Restarted => Weight::Note,
-        _ => Weight::Detail,
+        Fault::BusOff | Fault::ControllerOverflow => Severity::Warning,
+        Fault::Restarted => Severity::Note,
+        _ => Severity::Detail,
     }
 }
 

@@ -5,7 +5,7 @@ use crate::canopen::id::NodeId;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::autozero::{
-    AutozeroEffect, AutozeroFact, AutozeroFailure, Objection, OffsetChange, Proof, Quantity, Undo, ZeroTarget,
+    AutozeroEffect, AutozeroFact, AutozeroFailure, FailedCheck, OffsetChange, Proof, Quantity, Undo, ZeroTarget,
 };
 use crate::tasks::store::Group;
 
@@ -48,10 +48,10 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
         AutozeroFailure::RestartedBefore => {
             Words::new("the device restarted during the measurement: nothing was changed")
         }
-        AutozeroFailure::Unsafe { target, objection, channel } => {
-            let words = Words::new(format!("{}: nothing was changed", reason(objection)));
+        AutozeroFailure::Unsafe { target, failed_check, channel } => {
+            let words = Words::new(format!("{}: nothing was changed", reason(failed_check)));
             let choice = channel.map(|channel| format!(" --channel {channel}")).unwrap_or_default();
-            words.hint(remedy(*target, objection, &node, &choice))
+            words.hint(remedy(*target, failed_check, &node, &choice))
         }
         AutozeroFailure::RestartedAfter => Words::new(
             "the device accepted the signature, then restarted: the zero is lost unless the device stored it",
@@ -88,28 +88,28 @@ fn quantity(quantity: Quantity) -> String {
 }
 
 /// The reason why a safety check failed.
-fn reason(objection: &Objection) -> String {
+fn reason(failed_check: &FailedCheck) -> String {
     let part = |percent: &Option<f64>, otherwise: &str| {
         percent.map_or_else(|| otherwise.to_owned(), |percent| format!("{percent} % of the range"))
     };
-    match objection {
-        Objection::Absolute => {
+    match failed_check {
+        FailedCheck::Absolute => {
             "the sensor measures absolute pressure: if it is vented, it reads the air pressure, not zero".to_owned()
         }
-        Objection::Invalid { signal, status } => format!("{signal} has no valid value: {status}"),
-        Objection::RangeUnknown { signal } => {
+        FailedCheck::Invalid { signal, status } => format!("{signal} has no valid value: {status}"),
+        FailedCheck::RangeUnknown { signal } => {
             format!("the measuring range of {signal} is unknown, so the limit for a zero is unknown too")
         }
-        Objection::TooFar { signal, reading, limit, percent, .. } => {
+        FailedCheck::TooFar { signal, reading, limit, percent, .. } => {
             format!("{signal} is {}, limit {} ({})", quantity(*reading), quantity(*limit), part(percent, "--limit"))
         }
-        Objection::Unsteady { signal, spread, limit, percent } => format!(
+        FailedCheck::Unsteady { signal, spread, limit, percent } => format!(
             "the readings of {signal} vary by {} (limit {}, {}): the value is not steady",
             quantity(*spread),
             quantity(*limit),
             part(percent, "half of --limit")
         ),
-        Objection::TotalOffset { offset, total, limit } => format!(
+        FailedCheck::TotalOffset { offset, total, limit } => format!(
             "the offset is already {} and would become {}, limit {}",
             quantity(*offset),
             quantity(*total),
@@ -119,20 +119,21 @@ fn reason(objection: &Objection) -> String {
 }
 
 /// The remedy for a failed safety check.
-fn remedy(target: ZeroTarget, objection: &Objection, node: &str, choice: &str) -> String {
-    match objection {
-        Objection::Absolute => "apply a vacuum and use --force".to_owned(),
-        Objection::Invalid { .. } => format!("show the errors of the device: cangauge errors {node}"),
-        Objection::RangeUnknown { .. } => "add the largest reading to accept as zero: --limit VALUE".to_owned(),
-        Objection::TooFar { enough, limit, .. } => {
-            let enough = limit.unit.map_or_else(|| enough.clone(), |unit| format!("{enough}{unit}"));
+fn remedy(target: ZeroTarget, failed_check: &FailedCheck, node: &str, choice: &str) -> String {
+    match failed_check {
+        FailedCheck::Absolute => "apply a vacuum and use --force".to_owned(),
+        FailedCheck::Invalid { .. } => format!("show the errors of the device: cangauge errors {node}"),
+        FailedCheck::RangeUnknown { .. } => "add the largest reading to accept as zero: --limit VALUE".to_owned(),
+        FailedCheck::TooFar { sufficient_limit, limit, .. } => {
+            let sufficient_limit =
+                limit.unit.map_or_else(|| sufficient_limit.clone(), |unit| format!("{sufficient_limit}{unit}"));
             format!(
-                "vent or isolate the line; if the limit is too low: cangauge autozero {node}{choice} --limit {enough}"
+                "vent or isolate the line; if the limit is too low: cangauge autozero {node}{choice} --limit {sufficient_limit}"
             )
         }
-        Objection::Unsteady { .. } if target == ZeroTarget::Tare => "wait until the value is steady".to_owned(),
-        Objection::Unsteady { .. } => "wait until the value is steady, or use --force".to_owned(),
-        Objection::TotalOffset { .. } => {
+        FailedCheck::Unsteady { .. } if target == ZeroTarget::Tare => "wait until the value is steady".to_owned(),
+        FailedCheck::Unsteady { .. } => "wait until the value is steady, or use --force".to_owned(),
+        FailedCheck::TotalOffset { .. } => {
             "several small offsets have added up: check the sensor, or use --force".to_owned()
         }
     }
@@ -175,7 +176,7 @@ pub(in crate::output) fn effect(node: &str, effect: &AutozeroEffect) -> NoteText
 pub(in crate::output) fn fact(node: Option<NodeId>, fact: &AutozeroFact) -> NoteText {
     let node = node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     match fact {
-        AutozeroFact::Forced(objection) => NoteText::new("forced", format!("forced: {}", reason(objection))),
+        AutozeroFact::Forced(failed_check) => NoteText::new("forced", format!("forced: {}", reason(failed_check))),
         AutozeroFact::NothingChanged => NoteText::new("nothing-changed", "nothing was changed"),
         AutozeroFact::ProvedBy(proof) => {
             let proof = match proof {

@@ -137,7 +137,7 @@ pub(super) fn sdo(error: &SdoError) -> Words {
         | SdoFailure::WrongLength { .. }
         | SdoFailure::NotANumber
         | SdoFailure::Ambiguous
-        | SdoFailure::Overtime(_)
+        | SdoFailure::TimeLimit(_)
         | SdoFailure::Cancelled => words,
     }
 }

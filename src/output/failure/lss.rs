@@ -77,7 +77,7 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
         | LssCause::SilentAfterBootUp(_)
         | LssCause::StillOldNodeId { .. }
         | LssCause::NotSeen { .. } => after_reset(failure, &cause.cause),
-        LssCause::HostCannotFollow(_)
+        LssCause::HostCannotChange(_)
         | LssCause::NotAloneForRetime(_)
         | LssCause::SilentAtRate(_)
         | LssCause::SilentAfterStore { .. } => retime(&cause.cause),
@@ -206,7 +206,7 @@ fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
 /// Device and host did not change the bit rate together.
 fn retime(cause: &LssCause) -> Words {
     match cause {
-        LssCause::HostCannotFollow(obstacle) => {
+        LssCause::HostCannotChange(obstacle) => {
             let why = match obstacle {
                 HostObstacle::RateUnknown => "the new bit rate is unknown",
                 HostObstacle::NoBitRate => "the interface has no bit rate",

@@ -8,7 +8,7 @@ use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::diagnosis::Silence;
 use crate::tasks::pdo::{
-    Incomplete, Occupant, Parameter, PdoEffect, PdoFact, PdoFailure, Settings, StepError, StepWrite,
+    CobIdUser, Incomplete, Parameter, PdoEffect, PdoFact, PdoFailure, Settings, StepError, StepWrite,
 };
 use crate::tasks::store::Group;
 
@@ -36,7 +36,7 @@ pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
             Words::new(format!("the mapping of {number} is fixed ({entries}): nothing was changed"))
         }
         PdoFailure::Occupied { id, by } => {
-            Words::new(format!("identifier 0x{id} is used by {}: nothing was changed", occupant(by)))
+            Words::new(format!("identifier 0x{id} is used by {}: nothing was changed", cob_id_user(by)))
                 .hint("choose another identifier: --cob-id")
         }
         PdoFailure::Restricted { id } => {
@@ -93,12 +93,12 @@ fn nothing_received(nodes: &[(NodeId, Silence)]) -> Words {
     }
 }
 
-fn occupant(by: &Occupant) -> String {
+fn cob_id_user(by: &CobIdUser) -> String {
     match by {
-        Occupant::Service(name) => (*name).to_owned(),
-        Occupant::Own(name) => format!("its {name}"),
-        Occupant::Other(node, name) => format!("{name} of node {node}"),
-        Occupant::Traffic => "an unknown sender".to_owned(),
+        CobIdUser::Service(name) => (*name).to_owned(),
+        CobIdUser::Own(name) => format!("its {name}"),
+        CobIdUser::Other(node, name) => format!("{name} of node {node}"),
+        CobIdUser::Traffic => "an unknown sender".to_owned(),
     }
 }
 

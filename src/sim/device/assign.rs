@@ -1,13 +1,13 @@
 //! How a simulated device receives its node-ID and bit rate.
 
-use super::{Device, Phase, RECONNECT};
+use super::{COMMUNICATION_RESET_TIME, Device, Phase};
 use crate::bus::memory::Outbox;
 use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use crate::canopen::object::ObjectId;
 use crate::sim::data::SimState;
-use crate::sim::lss::Then;
+use crate::sim::lss::DeviceAction;
 use crate::sim::nmt::State;
 use crate::sim::objects::Area;
 use crate::sim::setup::OfflineAfter;
@@ -52,13 +52,13 @@ impl Device {
             }
         }
         match reply.then {
-            Then::Nothing => {}
-            Then::Boot => {
+            DeviceAction::Nothing => {}
+            DeviceAction::Boot => {
                 self.memory.settings.active.node = self.memory.settings.pending.node;
                 self.restart(Area::Communication);
-                self.phase = Phase::Starting(now + RECONNECT);
+                self.phase = Phase::Starting(now + COMMUNICATION_RESET_TIME);
             }
-            Then::Activate(delay) => {
+            DeviceAction::Activate(delay) => {
                 let after = self.state();
                 self.drop_pending(out);
                 self.phase = Phase::Retiming { after, switch: Some(now + delay), until: now + delay + delay };

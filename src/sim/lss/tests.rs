@@ -74,7 +74,7 @@ fn configuration_state_supports_every_service() {
     assert_eq!(bed.settings.persistent.node, NodeId::new(5).ok(), "not stored yet");
     bed.play(&[("17", "17")]);
     assert_eq!(bed.settings.persistent, Pair { node: NodeId::new(127).ok(), rate: BitRate::At(125_000) });
-    assert_eq!(bed.ask("15E803").then, Then::Activate(Duration::from_secs(1)));
+    assert_eq!(bed.ask("15E803").then, DeviceAction::Activate(Duration::from_secs(1)));
     bed.play(&[("11FF", "11"), ("0400", "-"), ("5A", "-")]);
     assert_eq!(bed.settings.pending.node, None);
 }
@@ -168,7 +168,7 @@ fn fastscan_finds_an_unconfigured_device() {
         assert!(bed.slave.is_configuring());
         // After it was found, the slave is silent. Its new node-ID takes effect when it returns to waiting state.
         bed.play(&[("5100000000800000", "-"), ("4C", "50"), ("5E", "5EFF"), ("110C", "11"), ("4C", "-")]);
-        assert_eq!(bed.ask("0400").then, Then::Boot);
+        assert_eq!(bed.ask("0400").then, DeviceAction::Boot);
         bed.play(&[("5100000000800000", "-")]);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::ZeroTarget;
 use super::channel::Offset;
-use super::safety::Objection;
+use super::safety::FailedCheck;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::canopen::value::{DataType, Value};
@@ -90,7 +90,7 @@ pub enum AutozeroFailure {
         /// The value to set to zero.
         target: ZeroTarget,
         /// The reason.
-        objection: Objection,
+        failed_check: FailedCheck,
         /// The channel, if the user chose one.
         channel: Option<u8>,
     },
@@ -221,7 +221,7 @@ pub enum Proof {
 #[derive(Clone, Debug, PartialEq)]
 pub enum AutozeroFact {
     /// A safety check failed and was skipped.
-    Forced(Objection),
+    Forced(FailedCheck),
     /// Nothing was changed, because it was a dry run.
     NothingChanged,
     /// The device did not acknowledge the signature, but this proves that it executed the signature.

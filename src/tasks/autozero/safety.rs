@@ -6,11 +6,11 @@ use crate::device::unit::Unit;
 use crate::measure::sample::Status;
 
 /// The limit for the reading, as a part of the measuring range.
-const READING: f64 = 0.01;
+const READING_LIMIT: f64 = 0.01;
 /// The limit for the variation, as a part of the limit for the reading.
-const SPREAD: f64 = 0.5;
+const VARIATION_LIMIT: f64 = 0.5;
 /// The limit for the total offset, as a part of the measuring range.
-const SUM: f64 = 0.05;
+const OFFSET_LIMIT: f64 = 0.05;
 
 /// The largest reading that is accepted as zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,7 +40,7 @@ impl Limits {
     /// `None` if the limit is a part of the range and the range is unknown, or if its unit does not convert.
     pub(super) fn new(limit: Limit, range: Option<f64>, unit: Option<Unit>) -> Option<Limits> {
         let (reading, percent) = match limit {
-            Limit::Default => (range? * READING, Some(100.0 * READING)),
+            Limit::Default => (range? * READING_LIMIT, Some(100.0 * READING_LIMIT)),
             Limit::Percent(percent) => (range? * percent / 100.0, Some(percent)),
             Limit::Value(value, None) => (value, None),
             Limit::Value(value, Some(from)) => {
@@ -50,16 +50,16 @@ impl Limits {
                 (from.convert(value, to)? - from.convert(0.0, to)?, None)
             }
         };
-        let spread = SPREAD * range.map_or(reading, |range| range * READING);
-        let sum = range.map_or(reading, |range| reading.max(range * SUM));
-        let spread_percent = range.map(|_| 100.0 * READING * SPREAD);
+        let spread = VARIATION_LIMIT * range.map_or(reading, |range| range * READING_LIMIT);
+        let sum = range.map_or(reading, |range| reading.max(range * OFFSET_LIMIT));
+        let spread_percent = range.map(|_| 100.0 * READING_LIMIT * VARIATION_LIMIT);
         Some(Limits { reading, spread, sum, percent, spread_percent })
     }
 }
 
 /// Why a safety check failed.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Objection {
+pub enum FailedCheck {
     /// The sensor measures absolute pressure.
     Absolute,
     /// A reading is invalid.
@@ -85,7 +85,7 @@ pub enum Objection {
         /// The limit in percent of the range; `None` if the user gave a value.
         percent: Option<f64>,
         /// A round limit that accepts this reading.
-        enough: String,
+        sufficient_limit: String,
     },
     /// The readings vary too much.
     Unsteady {
@@ -109,10 +109,10 @@ pub enum Objection {
     },
 }
 
-impl Objection {
-    /// Whether the objection also applies to a tare. For a tare, the process value may be far from zero.
+impl FailedCheck {
+    /// Whether the failed_check also applies to a tare. For a tare, the process value may be far from zero.
     pub(super) fn concerns_tare(&self) -> bool {
-        matches!(self, Objection::Invalid { .. } | Objection::Unsteady { .. })
+        matches!(self, FailedCheck::Invalid { .. } | FailedCheck::Unsteady { .. })
     }
 }
 
@@ -133,35 +133,35 @@ impl Measured<'_> {
     }
 
     /// All failed checks, the most serious first.
-    pub(super) fn objections(&self, limits: Option<&Limits>) -> Vec<Objection> {
+    pub(super) fn failed_checks(&self, limits: Option<&Limits>) -> Vec<FailedCheck> {
         let mut found = Vec::new();
         let signal = || self.signal.to_owned();
         if self.absolute == Some(true) {
-            found.push(Objection::Absolute);
+            found.push(FailedCheck::Absolute);
         }
         if let Some(status) = self.before.bad {
             let status = match status {
                 Status::Ok | Status::Invalid => "invalid",
                 other => other.as_str(),
             };
-            found.push(Objection::Invalid { signal: signal(), status });
+            found.push(FailedCheck::Invalid { signal: signal(), status });
         }
         let Some(limits) = limits else {
-            found.push(Objection::RangeUnknown { signal: signal() });
+            found.push(FailedCheck::RangeUnknown { signal: signal() });
             return found;
         };
         let Some(mean) = self.before.mean() else { return found };
         if mean.abs() > limits.reading {
-            found.push(Objection::TooFar {
+            found.push(FailedCheck::TooFar {
                 signal: signal(),
                 reading: self.quantity(mean),
                 limit: self.quantity(limits.reading),
                 percent: limits.percent,
-                enough: enough(mean),
+                sufficient_limit: sufficient_limit(mean),
             });
         }
         if self.before.spread() > limits.spread {
-            found.push(Objection::Unsteady {
+            found.push(FailedCheck::Unsteady {
                 signal: signal(),
                 spread: self.quantity(self.before.spread()),
                 limit: self.quantity(limits.spread),
@@ -171,14 +171,14 @@ impl Measured<'_> {
         let total = self.offset.map(|offset| offset - mean).filter(|total| total.abs() > limits.sum);
         if let (Some(total), Some(offset)) = (total, self.offset) {
             let limit = self.quantity(limits.sum);
-            found.push(Objection::TotalOffset { offset: self.quantity(offset), total: self.quantity(total), limit });
+            found.push(FailedCheck::TotalOffset { offset: self.quantity(offset), total: self.quantity(total), limit });
         }
         found
     }
 }
 
 /// A round limit that accepts this reading.
-fn enough(mean: f64) -> String {
+fn sufficient_limit(mean: f64) -> String {
     let needed = 1.05 * mean.abs();
     let step = 10f64.powf(needed.log10().floor() - 1.0);
     let steps = (needed / step).ceil();
@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn suggested_limit_is_round_and_sufficient() {
         for (mean, offered) in [(3.204, "3.4"), (-0.0123, "0.013"), (17.9, "19"), (950.0, "1000"), (0.1, "0.11")] {
-            assert_eq!(enough(mean), offered);
+            assert_eq!(sufficient_limit(mean), offered);
             assert!(offered.parse::<f64>().expect("a number") >= mean.abs());
         }
     }

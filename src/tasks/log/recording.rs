@@ -338,10 +338,11 @@ impl<'o> Recording<'o> {
         now: Mono,
         observer: &mut dyn Observer,
     ) -> ControlFlow<()> {
-        if matches!(decoded, Decoded::Tpdo(_)) && !self.has_kept_early && self.synced.is_open(frame.id()) {
+        if matches!(decoded, Decoded::Tpdo(_)) && !self.has_kept_early && self.synced.may_have_second_sender(frame.id())
+        {
             self.has_kept_early = true;
             self.early_until = Some(now + FOREIGN_SECOND_SENDER_TIMEOUT);
-        } else if self.has_kept_early && self.early_until.is_some() && self.synced.is_settled() {
+        } else if self.has_kept_early && self.early_until.is_some() && self.synced.is_decided() {
             let samples = std::mem::take(&mut self.samples);
             self.take_early(observer)?;
             self.samples = samples;

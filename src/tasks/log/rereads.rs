@@ -22,7 +22,7 @@ const WRITE_SETTLE_TIME: Duration = Duration::from_millis(500);
 const RETRY_INTERVAL: Duration = Duration::from_secs(1);
 /// In this number of attempts, every object that was answered before must be answered again. Later attempts accept a
 /// missing answer.
-const COMPLETE_ATTEMPTS: u32 = 5;
+const STRICT_ATTEMPTS: u32 = 5;
 /// Shortest interval between two rereads of a node because frames were lost. An overloaded bus loses frames all the
 /// time.
 const FRAMES_LOST_INTERVAL: Duration = Duration::from_secs(60);
@@ -130,8 +130,8 @@ impl Rereads {
     pub(super) fn start_due(&mut self, now: Mono, master: &mut Master<'_>) {
         for (&node, pending) in &mut self.pending {
             if pending.survey.is_none() && pending.due <= now {
-                let insists = pending.failures < COMPLETE_ATTEMPTS;
-                pending.survey = Some(BackgroundSurvey::start(node, &self.overrides, insists, master));
+                let requires_known_objects = pending.failures < STRICT_ATTEMPTS;
+                pending.survey = Some(BackgroundSurvey::start(node, &self.overrides, requires_known_objects, master));
             }
         }
     }

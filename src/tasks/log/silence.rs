@@ -173,7 +173,7 @@ impl Recording<'_> {
     }
 
     /// Reads objects of the silent nodes during a recording. The reasons are reported after all answers.
-    pub(super) fn ask_silent_nodes_meanwhile(&mut self, master: &mut Master<'_>) {
+    pub(super) fn read_silent_nodes_during_recording(&mut self, master: &mut Master<'_>) {
         self.questions.were_asked = true;
         let asked = self.questions();
         if !asked.is_empty() {

@@ -11,7 +11,7 @@ use super::node_id::taken;
 use super::objects::by_objects;
 use super::progress::{Progress, Stage};
 use super::resolve::resolve;
-use super::retime::{Retiming, leaves_host};
+use super::retime::{Retiming, needs_host_change};
 use super::services::{accepted_by_all, unchanged};
 use super::session::{Session, is_silent, prepared, restore_state};
 use super::{Notify, Target, Via};
@@ -134,8 +134,8 @@ impl Work<'_> {
     fn carry_out(&mut self, master: &mut Master<'_>, notify: Notify<'_>) -> Result<Assigned, Failure> {
         let (job, device) = (self.job, self.device);
         let mut report = self.report();
-        let leaves_host = leaves_host(master, self.rate);
-        let follows = job.retime && leaves_host;
+        let needs_host_change = needs_host_change(master, self.rate);
+        let follows = job.retime && needs_host_change;
         if let (true, Some(rate)) = (follows, self.rate) {
             let retiming = Retiming::new(master, job, device, &self.method, rate)?;
             let is_complete = retiming.carry_out(master, &mut self.progress, notify)?;
@@ -146,7 +146,7 @@ impl Work<'_> {
             }
         }
         let booted = match self.method.kind {
-            AssignKind::Lss => self.by_lss(master, follows, follows || !leaves_host, notify)?,
+            AssignKind::Lss => self.by_lss(master, follows, follows || !needs_host_change, notify)?,
             AssignKind::Objects => {
                 by_objects(master, device, &self.method, job.store, &mut self.progress)?;
                 false
@@ -154,7 +154,7 @@ impl Work<'_> {
         };
         notify(device.note(LssEvent::Progress(self.progress.clone())));
         // After a reset, the device would use a bit rate different from that of the host.
-        let Some(new) = job.id.filter(|_| follows || !leaves_host) else { return Ok(report) };
+        let Some(new) = job.id.filter(|_| follows || !needs_host_change) else { return Ok(report) };
         (report.confirmed, report.boot_time) = confirm(master, device, new, self.node_to_reset(new)?, booted)?;
         report.cob_ids = self.cob_ids(master)?;
         Ok(report)

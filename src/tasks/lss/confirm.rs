@@ -2,7 +2,7 @@
 
 use super::device::{DeviceName, LssDevice};
 use super::failure::{LssCause, LssFailure};
-use super::node_id::{Occupant, occupant};
+use super::node_id::{AnsweringDevices, answering_devices};
 use crate::bus::{Filters, Mono};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtCommand};
@@ -65,15 +65,17 @@ pub(super) fn confirm(
     let boot_time = if has_booted { Some(Duration::ZERO) } else { boot_up(master, new, start)? };
     let proof = if boot_time.is_some() { Confirmed::BootUp } else { Confirmed::Identity };
     let cause = match first_answer(master, new, boot_time.is_some())? {
-        Occupant::Device(found) if device.address.is_none_or(|address| address == found) => {
+        AnsweringDevices::Device(found) if device.address.is_none_or(|address| address == found) => {
             return Ok((proof, boot_time));
         }
-        Occupant::Unidentified if device.address.is_none() && boot_time.is_some() => return Ok((proof, boot_time)),
-        Occupant::Device(found) => LssCause::OtherDeviceAnswers(found),
-        Occupant::Unidentified => LssCause::NotIdentified,
-        Occupant::Several(sign) => LssCause::DuplicateNewNodeId(sign),
-        Occupant::None(waited) if boot_time.is_some() => LssCause::SilentAfterBootUp(waited),
-        Occupant::None(_) => return Err(not_seen(master, device, new, reset)?),
+        AnsweringDevices::Unidentified if device.address.is_none() && boot_time.is_some() => {
+            return Ok((proof, boot_time));
+        }
+        AnsweringDevices::Device(found) => LssCause::OtherDeviceAnswers(found),
+        AnsweringDevices::Unidentified => LssCause::NotIdentified,
+        AnsweringDevices::Several(sign) => LssCause::DuplicateNewNodeId(sign),
+        AnsweringDevices::None(waited) if boot_time.is_some() => LssCause::SilentAfterBootUp(waited),
+        AnsweringDevices::None(_) => return Err(not_seen(master, device, new, reset)?),
     };
     let name = DeviceName { node: Some(new), ..device.name() };
     Err(Failure::at(new, LssFailure { device: name, cause }))
@@ -91,11 +93,11 @@ fn boot_up(master: &mut Master<'_>, new: NodeId, start: Mono) -> Result<Option<D
 }
 
 /// The device that answers at the new node-ID. After a boot-up message, requests to a silent device are repeated.
-fn first_answer(master: &mut Master<'_>, new: NodeId, has_booted: bool) -> Result<Occupant, Failure> {
+fn first_answer(master: &mut Master<'_>, new: NodeId, has_booted: bool) -> Result<AnsweringDevices, Failure> {
     let until = master.now() + FIRST_ANSWER_TIMEOUT;
     loop {
-        let found = occupant(master, new)?;
-        if !matches!(found, Occupant::None(_)) || !has_booted || master.now() >= until {
+        let found = answering_devices(master, new)?;
+        if !matches!(found, AnsweringDevices::None(_)) || !has_booted || master.now() >= until {
             return Ok(found);
         }
         let again = master.now() + ASK_AGAIN_PAUSE;
@@ -111,7 +113,7 @@ fn not_seen(
     reset: Option<NodeId>,
 ) -> Result<Failure, Failure> {
     if let Some(old) = reset.filter(|old| *old != new)
-        && let Occupant::Device(found) = occupant(master, old)?
+        && let AnsweringDevices::Device(found) = answering_devices(master, old)?
         && device.address.is_none_or(|address| address == found)
     {
         return Ok(device.failure(LssCause::StillOldNodeId { old, new }));

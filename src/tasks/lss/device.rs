@@ -6,7 +6,7 @@ use super::failure::{LssCause, LssFailure};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
 use crate::device::assign::AssignKind;
-use crate::device::catalog::{self, MadeFor, Model};
+use crate::device::catalog::{self, Model, TargetDevice};
 use crate::device::description::Description;
 use crate::master::{LssError, Master};
 use crate::node::survey::identify;
@@ -128,7 +128,7 @@ impl Descriptions<'_> {
     /// The named description is for another device. Bus errors and Ctrl-C; the node stops answering.
     pub(super) fn model_of(&self, master: &mut Master<'_>, device: &LssDevice) -> Result<Option<Arc<Model>>, Failure> {
         let given = device.node.and_then(|node| self.overrides.get(&node)).or(self.given);
-        let is_other = |made_for: &&MadeFor| {
+        let is_other = |made_for: &&TargetDevice| {
             device.address.is_some_and(|device| !made_for.fits(Some(device.vendor), Some(device.product)))
         };
         if let Some(other) = given.and_then(|model| model.made_for.iter().find(is_other)) {

@@ -8,7 +8,7 @@ use super::progress::Progress;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss::{LssAddress, LssRange};
 use crate::canopen::object::ObjectId;
-use crate::device::catalog::MadeFor;
+use crate::device::catalog::TargetDevice;
 use crate::master::LssError;
 use crate::tasks::Kind;
 use crate::tasks::failure::lss_kind;
@@ -30,7 +30,7 @@ pub enum LssCause {
     /// An LSS service with the device failed.
     Service(Arc<LssError>),
     /// The description that the user chose is for this other device.
-    OtherDescription(MadeFor),
+    OtherDescription(TargetDevice),
     /// The device has no serial number, so it cannot be distinguished from others.
     NoSerialNumber,
     /// More than one device has this node-ID.
@@ -105,7 +105,7 @@ pub enum LssCause {
         waited: Duration,
     },
     /// The host cannot change its bit rate together with the device.
-    HostCannotFollow(HostObstacle),
+    HostCannotChange(HostObstacle),
     /// Another device is on the bus, so the bit rate of the bus cannot be changed.
     NotAloneForRetime(Neighbour),
     /// The device does not answer at the new bit rate (in bit/s).
@@ -215,7 +215,7 @@ impl LssFailure {
             | LssCause::ObjectsUnknown
             | LssCause::ObjectsOutOfReach
             | LssCause::NoObject(_)
-            | LssCause::HostCannotFollow(_)
+            | LssCause::HostCannotChange(_)
             | LssCause::NotAloneForRetime(_) => Kind::CheckFailed,
             LssCause::Number(..)
             | LssCause::NeedsStore(_)

@@ -51,7 +51,7 @@ pub enum TakenSign {
 
 /// The devices that answer at a node-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Occupant {
+pub(super) enum AnsweringDevices {
     /// One device with this identity.
     Device(LssAddress),
     /// Probably one device. It has no serial number, so it cannot be distinguished from others.
@@ -67,7 +67,7 @@ pub(super) enum Occupant {
 ///
 /// # Errors
 /// Bus errors and Ctrl-C; an answer that violates the protocol.
-pub(super) fn occupant(master: &mut Master<'_>, node: NodeId) -> Result<Occupant, Failure> {
+pub(super) fn answering_devices(master: &mut Master<'_>, node: NodeId) -> Result<AnsweringDevices, Failure> {
     master.listen(&Filters::All)?;
     let mut first: Option<[Option<u32>; 4]> = None;
     for _ in 0..IDENTITY_READS {
@@ -79,12 +79,12 @@ pub(super) fn occupant(master: &mut Master<'_>, node: NodeId) -> Result<Occupant
                 Err(SdoError { failure: SdoFailure::Refused(_) | SdoFailure::Fit(_), .. }) => None,
                 Err(SdoError { failure: SdoFailure::NoAnswer { waited, .. }, .. }) => {
                     return Ok(match monitor.has_collision {
-                        true => Occupant::Several(DuplicateSign::AnswersCollide),
-                        false => Occupant::None(waited),
+                        true => AnsweringDevices::Several(DuplicateSign::AnswersCollide),
+                        false => AnsweringDevices::None(waited),
                     });
                 }
                 Err(SdoError { failure: SdoFailure::TwoDevices(_), .. }) if !monitor.has_other_master => {
-                    return Ok(Occupant::Several(DuplicateSign::AnswersDiffer));
+                    return Ok(AnsweringDevices::Several(DuplicateSign::AnswersDiffer));
                 }
                 Err(error) => return Err(error.into()),
             };
@@ -92,19 +92,19 @@ pub(super) fn occupant(master: &mut Master<'_>, node: NodeId) -> Result<Occupant
                 monitor.listen(master, SECOND_ANSWER_TIMEOUT)?;
             }
             if let Some(sign) = monitor.sign(master) {
-                return Ok(Occupant::Several(sign));
+                return Ok(AnsweringDevices::Several(sign));
             }
         }
         if first.is_some_and(|first| first != parts) {
-            return Ok(Occupant::Several(DuplicateSign::AnswersDiffer));
+            return Ok(AnsweringDevices::Several(DuplicateSign::AnswersDiffer));
         }
         first = Some(parts);
     }
     Ok(match first.unwrap_or_default() {
         [Some(vendor), Some(product), Some(revision), Some(serial)] if serial != 0 => {
-            Occupant::Device(LssAddress { vendor, product, revision, serial })
+            AnsweringDevices::Device(LssAddress { vendor, product, revision, serial })
         }
-        _ => Occupant::Unidentified,
+        _ => AnsweringDevices::Unidentified,
     })
 }
 
@@ -226,11 +226,11 @@ fn ask_twice(master: &mut Master<'_>, node: NodeId, timeout: Duration) -> Result
 /// # Errors
 /// No device, more than one, or a device without a serial number; bus errors and Ctrl-C.
 pub(super) fn identity_of(master: &mut Master<'_>, node: NodeId) -> Result<LssAddress, Failure> {
-    let cause = match occupant(master, node)? {
-        Occupant::Device(address) => return Ok(address),
-        Occupant::Unidentified => LssCause::NoSerialNumber,
-        Occupant::Several(sign) => LssCause::DuplicateNodeId(sign),
-        Occupant::None(waited) => LssCause::NoAnswer(waited),
+    let cause = match answering_devices(master, node)? {
+        AnsweringDevices::Device(address) => return Ok(address),
+        AnsweringDevices::Unidentified => LssCause::NoSerialNumber,
+        AnsweringDevices::Several(sign) => LssCause::DuplicateNodeId(sign),
+        AnsweringDevices::None(waited) => LssCause::NoAnswer(waited),
     };
     let device = DeviceName { node: Some(node), address: None };
     Err(Failure::at(node, LssFailure { device, cause }))

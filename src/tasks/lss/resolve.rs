@@ -3,9 +3,9 @@
 use super::device::{Descriptions, LssDevice};
 use super::event::LssEvent;
 use super::failure::{LssCause, LssFailure};
-use super::node_id::{Occupant, identity_of, occupant};
+use super::node_id::{AnsweringDevices, answering_devices, identity_of};
 use super::session::{configured, is_silent};
-use super::sole::sole_device;
+use super::sole::only_device;
 use super::{Notify, Target, Via, nodes};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
@@ -27,7 +27,7 @@ pub(super) fn resolve(
     match target {
         Target::Node(node) => by_node_id(master, *node, descriptions, via),
         Target::Address(address) => by_address(master, *address, descriptions, notify),
-        Target::Only => sole_device(master, descriptions, force, notify),
+        Target::Only => only_device(master, descriptions, force, notify),
         Target::Unconfigured => unconfigured(master, descriptions),
     }
 }
@@ -73,12 +73,14 @@ fn by_address(
     nodes::refuse_shared_identity(master, address, device.node)?;
     let mut is_stopped = false;
     if let Some(node) = device.node {
-        match occupant(master, node)? {
-            Occupant::Device(found) if found == address => device.is_alone = true,
-            Occupant::Device(_) | Occupant::Several(_) => notify(device.note(LssEvent::SharedNodeId(node))),
+        match answering_devices(master, node)? {
+            AnsweringDevices::Device(found) if found == address => device.is_alone = true,
+            AnsweringDevices::Device(_) | AnsweringDevices::Several(_) => {
+                notify(device.note(LssEvent::SharedNodeId(node)))
+            }
             // The device answers LSS but not SDO, so it is stopped. No other device answers at its node-ID.
-            Occupant::None(_) => is_stopped = matches!(by_lss, LssNodeId::Known(_)),
-            Occupant::Unidentified => {}
+            AnsweringDevices::None(_) => is_stopped = matches!(by_lss, LssNodeId::Known(_)),
+            AnsweringDevices::Unidentified => {}
         }
     }
     if let LssNodeId::Silent(failure) = by_lss

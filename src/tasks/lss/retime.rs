@@ -7,7 +7,7 @@ use super::device::{LssDevice, Reach};
 use super::event::LssEvent;
 use super::failure::{HostObstacle, LssCause, LssEffect, Neighbour};
 use super::method::PlannedRate;
-use super::node_id::{LISTEN_TIME, Occupant, occupant};
+use super::node_id::{AnsweringDevices, LISTEN_TIME, answering_devices};
 use super::nodes;
 use super::objects::by_objects;
 use super::progress::{Progress, Stage};
@@ -35,7 +35,7 @@ const MARGIN: Duration = Duration::from_millis(50);
 const SEARCH_TIME: Duration = Duration::from_secs(4);
 
 /// Whether the device may change to a bit rate different from that of the host.
-pub(super) fn leaves_host(master: &Master<'_>, rate: Option<PlannedRate>) -> bool {
+pub(super) fn needs_host_change(master: &Master<'_>, rate: Option<PlannedRate>) -> bool {
     rate.is_some_and(|rate| rate.bits.is_none() || rate.bits != master.bus().bit_rate())
 }
 
@@ -63,7 +63,7 @@ impl<'a> Retiming<'a> {
         method: &'a AssignEntry,
         rate: PlannedRate,
     ) -> Result<Retiming<'a>, Failure> {
-        let refuse = |obstacle| device.failure(LssCause::HostCannotFollow(obstacle));
+        let refuse = |obstacle| device.failure(LssCause::HostCannotChange(obstacle));
         let new = rate.bits.ok_or_else(|| refuse(HostObstacle::RateUnknown))?;
         let old = master.bus().bit_rate().ok_or_else(|| refuse(HostObstacle::NoBitRate))?;
         let name = master.bus().name().to_owned();
@@ -110,12 +110,15 @@ impl<'a> Retiming<'a> {
         let previous = match session {
             Ok(session) => session.previous_state,
             Err(failure) if activated.is_none() => return Err(failure),
-            Err(failure) => return Err(self.go_back(master, failure, (master.now(), None), progress, notify)),
+            Err(failure) => {
+                return Err(self.restore_host_bit_rate(master, failure, (master.now(), None), progress, notify));
+            }
         };
         let start = activated.unwrap_or_else(|| master.now());
         notify(device.note(LssEvent::ChangingRate { bit_rate: self.new, delay_ms: DELAY_MS }));
-        let followed = self.follow(master, start);
-        let followed = followed.map_err(|failure| self.go_back(master, failure, (start, previous), progress, notify));
+        let followed = self.set_host_bit_rate(master, start);
+        let followed = followed
+            .map_err(|failure| self.restore_host_bit_rate(master, failure, (start, previous), progress, notify));
         master.set_tolerates_outages(false);
         followed?;
         progress.is_retimed = true;
@@ -139,7 +142,7 @@ impl<'a> Retiming<'a> {
     }
 
     /// Sets the host to the new bit rate, and waits until the device answers.
-    fn follow(&self, master: &mut Master<'_>, start: Mono) -> Result<(), Failure> {
+    fn set_host_bit_rate(&self, master: &mut Master<'_>, start: Mono) -> Result<(), Failure> {
         // No node acknowledges frames at a wrong bit rate.
         master.set_tolerates_outages(true);
         pause(master, start + DELAY + MARGIN, Policy::Reconnect)?;
@@ -152,7 +155,7 @@ impl<'a> Retiming<'a> {
     }
 
     /// Sets the host to the old bit rate again, and waits until the device answers.
-    fn go_back(
+    fn restore_host_bit_rate(
         &self,
         master: &mut Master<'_>,
         mut failure: Failure,
@@ -274,11 +277,11 @@ fn answers(master: &mut Master<'_>, device: &LssDevice, node: Option<NodeId>) ->
 /// Whether the device answers SDO. A stopped device does not, so its LSS answer is used.
 fn answers_now(master: &mut Master<'_>, device: &LssDevice, node: Option<NodeId>) -> Result<bool, Failure> {
     if let Some(node) = node {
-        match occupant(master, node)? {
-            Occupant::Device(found) => return Ok(device.address.is_none_or(|address| address == found)),
-            Occupant::Unidentified => return Ok(device.address.is_none()),
-            Occupant::Several(_) => return Ok(false),
-            Occupant::None(_) => {}
+        match answering_devices(master, node)? {
+            AnsweringDevices::Device(found) => return Ok(device.address.is_none_or(|address| address == found)),
+            AnsweringDevices::Unidentified => return Ok(device.address.is_none()),
+            AnsweringDevices::Several(_) => return Ok(false),
+            AnsweringDevices::None(_) => {}
         }
     }
     let Some(address) = device.address else { return Ok(false) };

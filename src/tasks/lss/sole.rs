@@ -4,7 +4,7 @@ use super::Notify;
 use super::device::{Descriptions, LssDevice, Reach};
 use super::event::{AnotherSlave, LssEvent, UnansweredService};
 use super::failure::LssCause;
-use super::node_id::{Occupant, occupant};
+use super::node_id::{AnsweringDevices, answering_devices};
 use super::nodes;
 use super::session::configured;
 use crate::canopen::id::NodeId;
@@ -29,7 +29,7 @@ struct SlaveAnswers {
 ///
 /// # Errors
 /// [`LssCause::NotTheOnly`] unless `force`; [`LssCause::NoDevice`]; bus errors and Ctrl-C.
-pub(super) fn sole_device(
+pub(super) fn only_device(
     master: &mut Master<'_>,
     descriptions: &Descriptions<'_>,
     force: bool,
@@ -81,10 +81,10 @@ fn by_sdo(master: &mut Master<'_>) -> Result<(LssDevice, Option<AnotherSlave>), 
     };
     let mut address = None;
     if let Some(node) = node {
-        match occupant(master, node)? {
-            Occupant::Device(found) => address = Some(found),
-            Occupant::Several(sign) => another = Some(AnotherSlave::SharedNodeId(node, sign)),
-            Occupant::Unidentified | Occupant::None(_) => {}
+        match answering_devices(master, node)? {
+            AnsweringDevices::Device(found) => address = Some(found),
+            AnsweringDevices::Several(sign) => another = Some(AnotherSlave::SharedNodeId(node, sign)),
+            AnsweringDevices::Unidentified | AnsweringDevices::None(_) => {}
         }
     }
     let is_alone = node.is_some() && another.is_none();

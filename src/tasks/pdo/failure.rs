@@ -50,7 +50,7 @@ pub enum PdoFailure {
         /// The identifier.
         id: CanId,
         /// Its user.
-        by: Occupant,
+        by: CobIdUser,
     },
     /// CiA 301 reserves the identifier for other services.
     Restricted {
@@ -127,7 +127,7 @@ impl Parameter {
 
 /// The user of a CAN identifier.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Occupant {
+pub enum CobIdUser {
     /// A service of the whole bus: SYNC or TIME.
     Service(&'static str),
     /// A service or PDO of the node itself: `EMCY`, `TPDO2`.

@@ -1,6 +1,6 @@
 //! Checks whether a CAN identifier is free for a TPDO.
 
-use super::failure::{Occupant, PdoFailure};
+use super::failure::{CobIdUser, PdoFailure};
 use super::session::Session;
 use crate::bus::Filters;
 use crate::canopen::id::{CanId, NodeId};
@@ -46,13 +46,13 @@ const COB_IDS: [(u16, u8, &str); 14] = [
 /// [`PdoFailure::Occupied`].
 pub(super) fn check_own(node: &Node, number: TpdoNumber, id: CanId) -> Result<(), Failure> {
     let mut used = vec![
-        (node.sync, Occupant::Service("SYNC")),
-        (CanId::SYNC, Occupant::Service("SYNC")),
-        (TIME, Occupant::Service("TIME")),
-        (node.emergency, Occupant::Own("EMCY".to_owned())),
+        (node.sync, CobIdUser::Service("SYNC")),
+        (CanId::SYNC, CobIdUser::Service("SYNC")),
+        (TIME, CobIdUser::Service("TIME")),
+        (node.emergency, CobIdUser::Own("EMCY".to_owned())),
     ];
     let others = node.tpdos.iter().filter(|tpdo| tpdo.number != number && tpdo.cob_id.is_valid());
-    used.extend(others.map(|tpdo| (tpdo.cob_id.can_id(), Occupant::Own(tpdo.number.to_string()))));
+    used.extend(others.map(|tpdo| (tpdo.cob_id.can_id(), CobIdUser::Own(tpdo.number.to_string()))));
     match used.into_iter().find(|(other, _)| *other == id) {
         Some((_, by)) => Err(Failure::at(node.id, PdoFailure::Occupied { id, by })),
         None => Ok(()),
@@ -86,7 +86,7 @@ pub(super) fn check_others(session: &mut Session<'_, '_>, id: CanId) -> Result<(
         number.map(CobId).is_some_and(|cob_id| is_used(cob_id) && cob_id.can_id() == id)
     });
     if let Some(((name, (other, ..)), _)) = used {
-        return Err(Failure::at(node, PdoFailure::Occupied { id, by: Occupant::Other(*other, name) }));
+        return Err(Failure::at(node, PdoFailure::Occupied { id, by: CobIdUser::Other(*other, name) }));
     }
     let until = master.now() + LISTEN_TIMEOUT;
     let heard = wait(master, until, Policy::Command, |_, event| match event {
@@ -95,7 +95,7 @@ pub(super) fn check_others(session: &mut Session<'_, '_>, id: CanId) -> Result<(
     })?;
     master.listen_to(&[node])?;
     match heard.done() {
-        Some(()) => Err(Failure::at(node, PdoFailure::Occupied { id, by: Occupant::Traffic })),
+        Some(()) => Err(Failure::at(node, PdoFailure::Occupied { id, by: CobIdUser::Traffic })),
         None => Ok(()),
     }
 }

@@ -16,7 +16,7 @@ mod show;
 mod state_switch;
 mod watch;
 
-pub use failure::{Incomplete, Occupant, Parameter, PdoEffect, PdoFact, PdoFailure, StepError, StepWrite};
+pub use failure::{CobIdUser, Incomplete, Parameter, PdoEffect, PdoFact, PdoFailure, StepError, StepWrite};
 
 pub use map::{MapReport, map};
 pub(super) use map::{change, read, steps};

@@ -370,13 +370,13 @@ impl<'a> Watcher<'a> {
             heard.heartbeat_stopped = period.is_some_and(|period| {
                 !period.is_zero() && now.since(last.max(self.start)) > period * 2 + HEARTBEAT_TOLERANCE
             });
-            (node.id, diagnose(node, &carries_something, &heard, findings.get(&node.id), &situation))
+            (node.id, diagnose(node, &has_mapped_object, &heard, findings.get(&node.id), &situation))
         };
         self.nodes.iter().map(silence).collect()
     }
 
     fn questions(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
-        self.nodes.iter().map(|node| (node.id, questions(node, &carries_something))).collect()
+        self.nodes.iter().map(|node| (node.id, questions(node, &has_mapped_object))).collect()
     }
 
     /// The result at the end.
@@ -400,7 +400,7 @@ impl<'a> Watcher<'a> {
 }
 
 /// Whether a TPDO contains an object.
-fn carries_something(tpdo: &Tpdo) -> bool {
+fn has_mapped_object(tpdo: &Tpdo) -> bool {
     !tpdo.mapping.is_empty()
 }
 

@@ -362,7 +362,7 @@ fn short_inquiry_answer_is_a_violation() {
 
 #[test]
 fn answer_with_a_bus_error_may_be_several() {
-    let gathered = |faults: &[Fault]| Gathered { answers: vec![1], crowded: false, faults: faults.to_vec() };
+    let gathered = |faults: &[Fault]| Gathered { answers: vec![1], has_several_slaves: false, faults: faults.to_vec() };
     assert!(gathered(&[]).is_one() && gathered(&[Fault::NoAcknowledge]).is_one());
     for fault in [Fault::Protocol, Fault::ErrorWarning, Fault::ErrorPassive, Fault::BusOff, Fault::Other] {
         assert!(!gathered(&[fault]).is_one(), "{fault:?}");

@@ -74,11 +74,11 @@ impl Recording<'_> {
         if let Some((node, emergency)) = self.emergencies.parse(frame) {
             self.emergency(node, emergency, at, observer);
         } else if let Some((node, life)) = Life::parse(frame) {
-            if let Some((node, length)) = Life::odd_length(frame) {
+            if let Some((node, length)) = Life::unusual_length(frame) {
                 self.wrong_heartbeat_length(node, length, at, observer);
             }
             self.life(node, life, at, master, observer);
-        } else if let Some((node, length)) = Life::odd_length(frame) {
+        } else if let Some((node, length)) = Life::unusual_length(frame) {
             self.wrong_heartbeat_length(node, length, at, observer);
         } else if let Some(node) = writes_setup(frame, &self.nodes) {
             self.request_reread(node, RereadReason::Written, at.mono, master);

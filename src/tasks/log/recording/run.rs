@@ -182,7 +182,7 @@ impl Recording<'_> {
     fn examine_silent_nodes(&mut self, waited: Duration, master: &mut Master<'_>) {
         self.look_for_unknown_tpdos(waited, master);
         if !self.questions.were_asked && waited >= FIRST_SAMPLE_TIMEOUT {
-            self.ask_silent_nodes_meanwhile(master);
+            self.read_silent_nodes_during_recording(master);
         }
     }
 
