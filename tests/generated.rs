@@ -6,6 +6,7 @@ use cangauge::cli::completions::script;
 use cangauge::cli::program;
 use cangauge::device::description;
 use cangauge::sim::Bench;
+use cangauge::tasks::conform::{Area, cases};
 use clap::Command;
 use clap_complete::Shell;
 use clap_mangen::Man;
@@ -34,6 +35,7 @@ fn man() -> Files {
     root.build();
     let mut pages = Files::new();
     let mut hand_written = hand_written();
+    hand_written.entry("cangauge-conform.1".to_owned()).or_default().insert_str(0, &conform_cases());
     let mut waiting = vec![root];
     while let Some(command) = waiting.pop() {
         waiting.extend(command.get_subcommands().filter(|command| !command.is_hide_set()).cloned());
@@ -61,6 +63,26 @@ fn hand_written() -> BTreeMap<String, String> {
             (name, text.replace("@DATE@", DATE).replace("@VERSION@", &version()))
         })
         .collect()
+}
+
+/// The section with all cases of `conform`, from the table that runs them.
+fn conform_cases() -> String {
+    let mut section = String::from(".SH CASES\n");
+    for area in Area::ALL {
+        section += &format!(".SS \"{} ({})\"\n", escape(area.title()), escape(area.name()));
+        for case in cases().filter(|case| case.area == area) {
+            let needs = case.needs.name().map(|needs| format!(" Needs: {needs}.")).unwrap_or_default();
+            let text = format!(
+                "{}. {}.{needs}\n.br\nIf not ({}): {}",
+                case.sentence,
+                case.clause,
+                case.severity.name(),
+                case.meaning
+            );
+            section += &format!(".TP\n\\fB{}\\fR\n{}\n", escape(case.id), escape(&text));
+        }
+    }
+    section
 }
 
 /// Escapes a text for roff.
@@ -247,6 +269,7 @@ fn every_key_of_a_description_has_an_entry_in_its_page() {
         "[[signal]]",
         "[[object]]",
         "[[emcy]]",
+        "[[deviation]]",
     ] {
         let mistakes = description::read(&format!("{table}\nno_such_key = 1\n")).expect_err("an unknown key");
         let mistake = mistakes.iter().find(|mistake| mistake.message.contains("no_such_key")).expect(table);

@@ -40,6 +40,7 @@ impl Command {
             Command::Pdo(pdo) => pdo.writes(),
             Command::Nmt(nmt) => nmt.writes(),
             Command::Config(config) => !config.only_reads(),
+            Command::Conform(conform) => !conform.dry_run,
             Command::Lss(_) | Command::Autozero(_) | Command::Tare(_) | Command::Store(_) | Command::Restore(_) => true,
             _ => false,
         };
@@ -52,6 +53,7 @@ impl Command {
             Command::Lss(lss) => lss.changes_devices(),
             Command::Nmt(nmt) => nmt.changes_devices(),
             Command::Autozero(autozero) => !autozero.dry_run,
+            Command::Conform(_) => false,
             _ => self.on_two_devices() == OnTwoDevices::RefuseWrites,
         }
     }

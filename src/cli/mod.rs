@@ -6,6 +6,7 @@ mod bus;
 mod check;
 pub mod completions;
 mod config;
+mod conform;
 mod descriptions;
 mod devices;
 mod doctor;
@@ -284,6 +285,7 @@ commands! {
     Restore(store::Restore): "restore";
     Sim(sim::Sim): "sim";
     Doctor(doctor::Doctor): "doctor";
+    Conform(conform::Conform): "conform";
     Monitor(monitor::Monitor): "monitor";
     Health(health::HealthCommand): "health";
     Objects(objects::Objects): "objects";

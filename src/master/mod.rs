@@ -11,16 +11,19 @@ pub mod lss;
 mod machine;
 mod missed_answer;
 mod parallel;
+mod raw;
 mod request;
 mod sdo;
 mod second_answer;
 mod send;
+mod transcript;
 pub mod transfer;
 
 pub use lss::{Lss, LssError};
 pub use missed_answer::MissedAnswer;
 pub use request::{Answer, NUMBER_LIMIT, Operation, Request, SdoError, SdoFailure, TEXT_LIMIT, Ticket};
 pub use second_answer::{Answers, OnTwoDevices, SecondAnswer};
+pub use transcript::{Exchanged, Transcript};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, TransferKind, read_object, write_object};
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
@@ -28,7 +31,6 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::object::ObjectId;
-use crate::canopen::value::{DataType, Value};
 use crate::device::quirk::Quirk;
 use sdo::SdoClient;
 use send::Outgoing;
@@ -105,6 +107,8 @@ pub struct Master<'bus> {
     receives_all: bool,
     /// Whether answers to our transfers are returned as frames too.
     delivers_answers: bool,
+    /// Whether received frames are kept from the SDO client. See [`Master::exchange`].
+    bypasses_sdo: bool,
     outgoing: Outgoing,
     /// A frame that was received after the deadline. It is handled next.
     pending: Option<Received>,
@@ -118,9 +122,21 @@ impl<'bus> Master<'bus> {
     /// A master on `bus`.
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
         let (sdo, filters, outgoing) = (SdoClient::default(), Filters::All, Outgoing::new());
-        let (receives_all, delivers_answers) = (false, false);
+        let (receives_all, delivers_answers, bypasses_sdo) = (false, false, false);
         let (pending, foreign_nmt, seen) = (None, None, Mono::START);
-        Master { bus, timing, sdo, filters, receives_all, delivers_answers, outgoing, pending, foreign_nmt, seen }
+        Master {
+            bus,
+            timing,
+            sdo,
+            filters,
+            receives_all,
+            delivers_answers,
+            bypasses_sdo,
+            outgoing,
+            pending,
+            foreign_nmt,
+            seen,
+        }
     }
 
     /// Sets the host's interface to another bit rate in bit/s. Transfers in progress end, and waiting frames are lost.
@@ -363,8 +379,11 @@ impl<'bus> Master<'bus> {
                         self.pending = Some(received);
                         return Ok(Happening::Deadline);
                     }
+                    if let Some(transcript) = &mut self.outgoing.transcript {
+                        transcript.push(at, false, received.frame);
+                    }
                     self.sdo.on_time(at, &self.timing, &mut self.outgoing);
-                    if !self.sdo.on_frame(&received, &self.timing, &mut self.outgoing) {
+                    if self.bypasses_sdo || !self.sdo.on_frame(&received, &self.timing, &mut self.outgoing) {
                         self.sdo.on_other_frame(&received.frame);
                         self.foreign_nmt = NmtCommand::parse(&received.frame).or(self.foreign_nmt);
                         return Ok(Happening::Frame(received));
@@ -460,29 +479,5 @@ impl<'bus> Master<'bus> {
             }
         }
         Ok(results.into_iter().flatten().collect())
-    }
-
-    /// Carries out one transfer.
-    ///
-    /// # Errors
-    /// Outer: the bus failed or the user interrupted. Inner: the transfer failed.
-    pub fn transfer_one(&mut self, request: Request) -> Result<Result<Answer, SdoError>, Error> {
-        let (node, object, operation) = (request.node, request.object, request.operation());
-        let result = self.transfer(vec![request], &mut |_| {})?.pop();
-        Ok(result.unwrap_or(Err(SdoError { node, object, operation, failure: SdoFailure::Cancelled })))
-    }
-
-    /// Reads a value of a known type.
-    ///
-    /// # Errors
-    /// Outer: the bus failed or the user interrupted. Inner: the transfer failed or the bytes do not fit the type.
-    pub fn read(
-        &mut self,
-        node: NodeId,
-        object: ObjectId,
-        data_type: DataType,
-    ) -> Result<Result<Value, SdoError>, Error> {
-        let answer = self.transfer_one(Request::read(node, object))?;
-        Ok(answer.and_then(|answer| answer.value(node, object, Some(data_type)).map(|(value, _)| value)))
     }
 }

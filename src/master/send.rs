@@ -1,6 +1,6 @@
 //! The queue of frames to send. Sending is paced to the bit rate. A full transmit queue is retried.
 
-use super::Ticket;
+use super::{Ticket, Transcript};
 use crate::bus::{Bus, BusError, Mono};
 use crate::canopen::frame::Frame;
 use crate::canopen::wire_length::{bit_time, frame_time};
@@ -31,6 +31,8 @@ pub(super) struct Outgoing {
     first: Option<Frame>,
     /// When the bus accepted this frame.
     first_at: Option<Mono>,
+    /// The record of all frames in both directions, while one is made.
+    pub(super) transcript: Option<Transcript>,
 }
 
 impl Outgoing {
@@ -44,6 +46,7 @@ impl Outgoing {
             tolerates_outages: false,
             first: None,
             first_at: None,
+            transcript: None,
         }
     }
 
@@ -67,7 +70,8 @@ impl Outgoing {
 
     /// Drops all frames and reads the bit rate again when it is needed.
     pub(super) fn reset(&mut self) {
-        *self = Outgoing { tolerates_outages: self.tolerates_outages, ..Outgoing::new() };
+        let transcript = self.transcript.take();
+        *self = Outgoing { tolerates_outages: self.tolerates_outages, transcript, ..Outgoing::new() };
     }
 
     /// When the bus accepted the frame that was last queued before all others, returned once. `None` if it still waits
@@ -147,6 +151,9 @@ impl Outgoing {
                 }
                 Err(BusError::Down(_) | BusError::NoInterface(_)) if self.tolerates_outages => is_taken = false,
                 Err(error) => return Err(error),
+            }
+            if let Some(transcript) = self.transcript.as_mut().filter(|_| is_taken) {
+                transcript.push(bus.mono(), true, *frame);
             }
             if ticket.is_none() && self.first == Some(*frame) {
                 self.first = None;

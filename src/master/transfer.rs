@@ -13,12 +13,12 @@
 //! support block transfer. So it is used only if it saves frames: see [`BlockMode::Auto`].
 
 use super::request::NUMBER_LIMIT;
-use super::{Answer, Error, Happening, Master, Operation, Request, SdoError, Ticket};
+use super::{Answer, Error, Happening, Master, Operation, Request, SdoError, SdoFailure, Ticket};
 use crate::bus::{BusError, Received};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, DownloadSize};
-use crate::canopen::value::DataType;
+use crate::canopen::value::{DataType, Value};
 use std::time::Duration;
 
 /// Up to this size in bytes, a segmented transfer needs no more frames than a block transfer.
@@ -205,6 +205,32 @@ impl Master<'_> {
                 _ => {}
             }
         }
+    }
+}
+
+impl Master<'_> {
+    /// Carries out one transfer.
+    ///
+    /// # Errors
+    /// Outer: the bus failed or the user interrupted. Inner: the transfer failed.
+    pub fn transfer_one(&mut self, request: Request) -> Result<Result<Answer, SdoError>, Error> {
+        let (node, object, operation) = (request.node, request.object, request.operation());
+        let result = self.transfer(vec![request], &mut |_| {})?.pop();
+        Ok(result.unwrap_or(Err(SdoError { node, object, operation, failure: SdoFailure::Cancelled })))
+    }
+
+    /// Reads a value of a known type.
+    ///
+    /// # Errors
+    /// Outer: the bus failed or the user interrupted. Inner: the transfer failed or the bytes do not fit the type.
+    pub fn read(
+        &mut self,
+        node: NodeId,
+        object: ObjectId,
+        data_type: DataType,
+    ) -> Result<Result<Value, SdoError>, Error> {
+        let answer = self.transfer_one(Request::read(node, object))?;
+        Ok(answer.and_then(|answer| answer.value(node, object, Some(data_type)).map(|(value, _)| value)))
     }
 }
 

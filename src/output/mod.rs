@@ -4,6 +4,7 @@ pub mod autozero;
 pub mod check_progress;
 pub mod config;
 pub mod config_record;
+pub mod conform;
 pub mod console;
 pub mod csv;
 pub mod dbc;

@@ -5,7 +5,7 @@
 use super::console::Console;
 use super::doubt;
 use super::failure::host::up_by_hand;
-use super::failure::{self, autozero, config, pdo, settings, store};
+use super::failure::{self, autozero, config, conform, pdo, settings, store};
 use super::report::Cell;
 use super::{lss, objects};
 use crate::canopen::id::NodeId;
@@ -82,6 +82,7 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> NoteText {
         Effect::Settings(effect) => settings::effect(&number, effect),
         Effect::State(state) => state_text(&number, *state),
         Effect::Store(effect) => store::effect(&number, effect),
+        Effect::Conform(effect) => conform::effect(&number, effect),
     }
 }
 

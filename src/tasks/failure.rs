@@ -7,7 +7,7 @@ pub use crate::master::{LssError, MissedAnswer, Operation, SdoError, SdoFailure,
 pub use crate::measure::expression::ExpressionError;
 
 use super::note::{Effect, Rule};
-use super::{autozero, check, config, detect, host, log, lss, nmt, pdo, read, scan, settings, store};
+use super::{autozero, check, config, conform, detect, host, log, lss, nmt, pdo, read, scan, settings, store};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
 use crate::canopen::object::ObjectId;
@@ -97,6 +97,8 @@ pub enum Cause {
     Detect(detect::DetectFailure),
     /// A channel was not set to zero.
     Autozero(autozero::AutozeroFailure),
+    /// A device was not checked against the standard.
+    Conform(conform::ConformFailure),
 }
 
 impl Cause {
@@ -137,6 +139,7 @@ impl Cause {
             Cause::Lss(cause) => cause.kind(),
             Cause::Detect(cause) => cause.kind(),
             Cause::Autozero(cause) => cause.kind(),
+            Cause::Conform(cause) => cause.kind(),
         }
     }
 

@@ -3,6 +3,7 @@
 pub mod autozero;
 pub mod check;
 pub mod config;
+pub mod conform;
 pub mod describe;
 pub mod detect;
 pub mod diagnosis;

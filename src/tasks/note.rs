@@ -4,6 +4,7 @@
 
 use super::autozero::{AutozeroEffect, AutozeroFact};
 use super::config::{ConfigEffect, ConfigFact};
+use super::conform::ConformEffect;
 use super::lss::{LssEffect, LssFact};
 use super::pdo::{PdoEffect, PdoFact};
 use super::settings::{SettingsEffect, SettingsFact};
@@ -49,6 +50,8 @@ pub enum Effect {
     State(StateEffect),
     /// A store or restore failed.
     Store(StoreEffect),
+    /// A check against the standard ended early.
+    Conform(ConformEffect),
 }
 
 /// A rule of a description that a number violates.

@@ -7,6 +7,7 @@ mod bus;
 mod check;
 mod config;
 mod config_series;
+mod conform;
 mod descriptions;
 mod devices;
 mod doctor;

@@ -4,6 +4,7 @@ mod answers;
 mod assign;
 mod bit_rates;
 mod config;
+mod conform;
 mod detect;
 mod doctor;
 mod full_queue;

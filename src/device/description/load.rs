@@ -50,6 +50,7 @@ fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
     let (mut signals, signal_tables) = entries(file, "signal", signal);
     let (objects, object_tables) = entries(file, "object", object);
     let (emergencies, emergency_tables) = entries(file, "emcy", emergency);
+    let (deviations, _) = entries(file, "deviation", deviation);
     file.finish();
     number_signals(&mut signals);
     let description = Description {
@@ -74,6 +75,7 @@ fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
         signals,
         objects,
         emergencies,
+        deviations,
     };
     check::check(
         &description,
@@ -296,4 +298,11 @@ fn emergency(table: &mut Table<'_>) -> Option<EmergencyEntry> {
     let (bytes, overload) = (table.list("bytes"), table.optional("overload").unwrap_or(false));
     table.finish();
     Some(EmergencyEntry { code: code?, text: text?, register_bit, register, bytes, overload })
+}
+
+fn deviation(table: &mut Table<'_>) -> Option<Deviation> {
+    let (case, objects) = (table.required("case"), table.list("objects"));
+    let (text, page) = (table.required("text"), table.required("page"));
+    table.finish();
+    Some(Deviation { case: case?, objects, text: text?, page: page? })
 }

@@ -89,6 +89,21 @@ pub struct Description {
     pub objects: Vec<ObjectEntry>,
     /// The meanings of its emergency codes.
     pub emergencies: Vec<EmergencyEntry>,
+    /// The deviations from the standard that its manual states.
+    pub deviations: Vec<Deviation>,
+}
+
+/// A deviation from the standard that the manual of a device states.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Deviation {
+    /// The case of `conform` that finds it: `SDO-07`.
+    pub case: String,
+    /// The indices that it concerns; empty for all.
+    pub objects: Vec<ObjectId>,
+    /// What the manual states.
+    pub text: String,
+    /// Page or section of the manual.
+    pub page: String,
 }
 
 /// The object that decides how the device starts after power-on.

@@ -7,6 +7,7 @@ pub(super) mod autozero;
 mod below;
 mod check;
 pub(super) mod config;
+pub(super) mod conform;
 mod detect;
 pub mod host;
 mod log;
@@ -233,5 +234,6 @@ fn words(failure: &Failure) -> Words {
         Cause::Lss(cause) => lss::words(failure, cause),
         Cause::Detect(cause) => detect::words(cause),
         Cause::Autozero(cause) => autozero::words(failure, cause),
+        Cause::Conform(cause) => conform::words(failure, cause),
     }
 }

@@ -1,0 +1,153 @@
+//! Results of `conform`: one row for each case.
+
+mod words;
+
+pub use words::{finding, page, why_not};
+
+use super::report::{Cell, Column, Report};
+use super::text;
+use crate::canopen::id::NodeId;
+use crate::tasks::conform::{Case, CaseResult, ConformReport, Exchanged, StateAfter, Transcript, Verdict};
+use std::io::{self, Write};
+
+/// One case in the list of `--dry-run`.
+#[derive(Clone, Copy, Debug)]
+pub struct CaseRow(pub &'static Case);
+
+impl Report for CaseRow {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("case"),
+        Column::new("area"),
+        Column::new("needs"),
+        Column::new("clause").data_only(),
+        Column::new("severity").data_only(),
+        Column::new("sentence").heading("WHAT"),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let case = self.0;
+        vec![
+            case.id.into(),
+            case.area.name().into(),
+            case.needs.name().map_or(Cell::Null, Into::into),
+            case.clause.into(),
+            case.severity.name().into(),
+            case.sentence.into(),
+        ]
+    }
+}
+
+/// The result of one case.
+#[derive(Clone, Debug)]
+pub struct ResultRow {
+    /// The node.
+    pub node: NodeId,
+    /// The result.
+    pub result: CaseResult,
+}
+
+impl ResultRow {
+    /// The findings, or why there is no verdict.
+    fn details(&self) -> Vec<String> {
+        match &self.result.verdict {
+            Verdict::Pass => Vec::new(),
+            Verdict::Deviates(findings) => findings.iter().map(finding).collect(),
+            Verdict::NotJudged(why) => vec![why_not(why)],
+            Verdict::NotApplicable(why) => vec![why_not(why)],
+        }
+    }
+}
+
+/// The frames as in `candump`: `>` for sent ones.
+fn frames(transcript: &Transcript) -> Vec<String> {
+    let frame = |one: &Exchanged| format!("{} {}", if one.is_sent { '>' } else { '<' }, one.frame);
+    transcript.frames.iter().map(frame).collect()
+}
+
+impl Report for ResultRow {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("node").data_only(),
+        Column::new("case"),
+        Column::new("area").data_only(),
+        Column::new("verdict"),
+        Column::new("known").data_only(),
+        Column::new("severity").data_only(),
+        Column::new("sentence").heading("WHAT"),
+        Column::new("clause").data_only(),
+        Column::new("details").data_only(),
+        Column::new("meaning").data_only(),
+        Column::new("not_restored").data_only(),
+        Column::new("seconds").data_only(),
+        Column::new("frames").json_only(),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let (result, case) = (&self.result, self.result.case);
+        let deviates = matches!(result.verdict, Verdict::Deviates(_));
+        vec![
+            self.node.into(),
+            case.id.into(),
+            case.area.name().into(),
+            result.verdict.name().into(),
+            result.known.clone().map_or(Cell::Null, Into::into),
+            case.severity.name().into(),
+            case.sentence.into(),
+            case.clause.into(),
+            Cell::list(self.details()),
+            if deviates { case.meaning.into() } else { Cell::Null },
+            Cell::list(result.not_restored.iter().map(ToString::to_string)),
+            Cell::Real(result.length.as_secs_f64(), 3),
+            Cell::list(frames(&result.transcript)),
+        ]
+    }
+
+    fn text(reports: &[Self], out: &mut dyn Write) -> io::Result<()> {
+        reports.iter().try_for_each(|report| report.line(out))
+    }
+
+    fn line(&self, out: &mut dyn Write) -> io::Result<()> {
+        let (result, case) = (&self.result, self.result.case);
+        writeln!(out, "{:<7} {:<14}  {}", case.id, result.verdict.name(), case.sentence)?;
+        for detail in self.details() {
+            writeln!(out, "        {}", text::safe(&detail))?;
+        }
+        if let Verdict::Deviates(_) = result.verdict {
+            match &result.known {
+                Some(known) => writeln!(out, "        {}", page(known))?,
+                None => writeln!(out, "        {} ({}): {}", case.severity.name(), case.clause, case.meaning)?,
+            }
+        }
+        if !result.not_restored.is_empty() {
+            writeln!(out, "        not restored: {}", super::failure::conform::list(&result.not_restored))?;
+        }
+        Ok(())
+    }
+}
+
+/// The counts in one line: `62 cases in 8.1 s: 50 pass, 2 deviate (1 known), 10 not applicable`.
+pub fn summary(report: &ConformReport) -> String {
+    let count = |wanted: fn(&CaseResult) -> bool| report.results.iter().filter(|result| wanted(result)).count();
+    let deviates = |result: &CaseResult| matches!(result.verdict, Verdict::Deviates(_));
+    let counts = [
+        (count(|result| matches!(result.verdict, Verdict::Pass)), "pass"),
+        (count(CaseResult::is_new_deviation), "deviate"),
+        (report.results.iter().filter(|result| deviates(result) && result.known.is_some()).count(), "known deviations"),
+        (count(|result| matches!(result.verdict, Verdict::NotJudged(_))), "not judged"),
+        (count(|result| matches!(result.verdict, Verdict::NotApplicable(_))), "not applicable"),
+    ];
+    let counts: Vec<String> =
+        counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
+    format!("{} cases in {:.1} s: {}", report.results.len(), report.length.as_secs_f64(), counts.join(", "))
+}
+
+/// What was not restored.
+pub fn left(report: &ConformReport) -> Option<String> {
+    let objects = super::failure::conform::list(&report.not_restored);
+    let state = "the NMT state from before is unknown: the node is pre-operational".to_owned();
+    match (report.not_restored.is_empty(), report.state) {
+        (true, StateAfter::Unchanged | StateAfter::Restored(_)) => None,
+        (true, StateAfter::Unknown) => Some(state),
+        (false, StateAfter::Unknown) => Some(format!("not restored: {objects}; {state}")),
+        (false, _) => Some(format!("not restored: {objects}")),
+    }
+}

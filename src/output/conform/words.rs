@@ -1,0 +1,119 @@
+//! The words for findings.
+
+use crate::bus::time::format_duration;
+use crate::output::failure::ErrorMessage;
+use crate::output::text::spaced_bytes;
+use crate::tasks::conform::{Expected, Finding, Seen, WhyNot};
+use std::time::Duration;
+
+/// A finding in one line: the object, what was expected, and what was seen.
+pub fn finding(finding: &Finding) -> String {
+    let object = finding.object.map(|object| format!("{object}: ")).unwrap_or_default();
+    format!("{object}expected {}; seen: {}", expected(&finding.expected), seen(&finding.seen))
+}
+
+/// Where the manual states a deviation.
+pub fn page(page: &str) -> String {
+    format!("known: the manual states it (page {page})")
+}
+
+fn codes(codes: &[u32]) -> String {
+    codes.iter().map(|code| format!("0x{code:08X}")).collect::<Vec<_>>().join(" or ")
+}
+
+/// A duration with at most one decimal digit of a millisecond.
+fn duration(length: Duration) -> String {
+    if length < Duration::from_secs(1) {
+        let milliseconds = (length.as_secs_f64() * 10_000.0).round() / 10.0;
+        return format!("{milliseconds} ms");
+    }
+    format_duration(length)
+}
+
+fn expected(expected: &Expected) -> String {
+    match expected {
+        Expected::Abort(list) => format!("abort {}", codes(list)),
+        Expected::Command(list) => {
+            let list: Vec<String> = list.iter().map(|command| format!("{command:02X}h")).collect();
+            format!("command specifier {}", list.join(" or "))
+        }
+        Expected::Segment => "a segment with the toggle bit of the request".to_owned(),
+        Expected::EightBytes => "eight bytes".to_owned(),
+        Expected::NoAnswer => "no answer".to_owned(),
+        Expected::Answer => "an answer for this object".to_owned(),
+        Expected::Entry => "an entry, because sub-index 0 names it as the highest".to_owned(),
+        Expected::Bytes(bytes) => format!("the bytes {}", spaced_bytes(bytes)),
+        Expected::OtherBytes(bytes) => format!("other bytes than {}", spaced_bytes(bytes)),
+        Expected::OtherCanId => "another CAN-ID".to_owned(),
+        Expected::ZeroPadding => "zeros in the unused bytes".to_owned(),
+        Expected::Size(size) => format!("{size} bytes"),
+        Expected::Crc(crc) => format!("CRC 0x{crc:04X}"),
+        Expected::Range(low, high) => format!("{low} to {high}"),
+        Expected::Text => "printable text".to_owned(),
+        Expected::State(state) => state.to_string(),
+        Expected::StateAfterBoot => "pre-operational, or operational if the node starts by itself".to_owned(),
+        Expected::BootUp => "one boot-up message with one byte 00h".to_owned(),
+        Expected::OneByte => "one byte with bit 7 clear".to_owned(),
+        Expected::Frames(count) => format!("{count} frames"),
+        Expected::Period(period) => format!("a period of {}", duration(*period)),
+        Expected::Within(time) => format!("a frame within {}", duration(*time)),
+        Expected::AlternatingToggle => "the state, with a toggle bit that alternates".to_owned(),
+        Expected::FirstToggle => "the state, with the toggle bit 0".to_owned(),
+        Expected::LifeGuardingEvent => "emergency 8130h, or pre-operational".to_owned(),
+        Expected::GenericErrorBit => "bit 0 set".to_owned(),
+    }
+}
+
+fn seen(seen: &Seen) -> String {
+    match seen {
+        Seen::Abort(code) => format!("abort {code}"),
+        Seen::Frame(frame) => frame.to_string(),
+        Seen::Nothing(time) => format!("nothing within {}", duration(*time)),
+        Seen::Bytes(bytes) if bytes.is_empty() => "no bytes".to_owned(),
+        Seen::Bytes(bytes) => format!("the bytes {}", spaced_bytes(bytes)),
+        Seen::Number(number) => number.to_string(),
+        Seen::State(Some(state)) => state.to_string(),
+        Seen::State(None) => "no state".to_owned(),
+        Seen::Frames(count) => format!("{count} frames"),
+        Seen::Period(period) => duration(*period),
+        Seen::Crc(crc) => format!("CRC 0x{crc:04X}"),
+        Seen::After(time) => format!("a frame after {}", duration(*time)),
+    }
+}
+
+/// Why a case has no verdict.
+pub fn why_not(why: &WhyNot) -> String {
+    match why {
+        WhyNot::NoObject(object) => format!("the device does not have {object}"),
+        WhyNot::NoSuitableObject => "no known object of the device is suitable".to_owned(),
+        WhyNot::NoSegments => "the device has no segmented transfer".to_owned(),
+        WhyNot::NoBlocks => "the device has no block transfer".to_owned(),
+        WhyNot::NotWritable(object) => format!("{object} cannot be changed"),
+        WhyNot::NoState => "the node shows no NMT state: it has no heartbeat (0x1017:0)".to_owned(),
+        WhyNot::NoGuarding => "the device does not answer node guarding".to_owned(),
+        WhyNot::ErrorHistory => "not run, because the error history (0x1003) is not empty".to_owned(),
+        WhyNot::NoRemoteFrames => "this bus carries no remote frames".to_owned(),
+        WhyNot::NotAlone => "not run, because other nodes are on the bus".to_owned(),
+        WhyNot::Failed(failure) => ErrorMessage::of(failure).message,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::canopen::object::ObjectId;
+    use crate::canopen::sdo::AbortCode;
+
+    #[test]
+    fn finding_names_object_expectation_and_observation() {
+        let abort = Seen::Abort(AbortCode(0x0504_0001));
+        let found = Finding {
+            object: Some(ObjectId::new(0x1017, 0)),
+            expected: Expected::Abort(&[0x0607_0010, 0x0800_0000]),
+            seen: abort,
+        };
+        let text = "0x1017:0: expected abort 0x06070010 or 0x08000000; seen: abort 0x05040001, ";
+        assert!(finding(&found).starts_with(text), "{}", finding(&found));
+        assert_eq!(seen(&Seen::Period(Duration::from_micros(100_449))), "100.4 ms");
+    }
+}

@@ -1,0 +1,49 @@
+//! Text for causes and effects of `conform`.
+
+use super::Words;
+use crate::canopen::object::ObjectId;
+use crate::output::notes::NoteText;
+use crate::tasks::Failure;
+use crate::tasks::conform::{ConformEffect, ConformFailure};
+
+/// The message and the hint for a cause.
+pub(super) fn words(failure: &Failure, cause: &ConformFailure) -> Words {
+    let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
+    match cause {
+        ConformFailure::Unfinished => {
+            Words::new("an earlier change of its settings was not completed: nothing was changed")
+                .hint(format!("cangauge config apply {node} --rollback"))
+        }
+        ConformFailure::NotAlone { nodes, frame } => {
+            let seen = match (nodes.as_slice(), frame) {
+                ([], Some(frame)) => format!("other traffic is on the bus ({frame})"),
+                ([], None) => "other traffic is on the bus".to_owned(),
+                ([one], _) => format!("node {one} is on the bus, too"),
+                (several, _) => {
+                    let several: Vec<String> = several.iter().map(ToString::to_string).collect();
+                    format!("nodes {} are on the bus, too", several.join(", "))
+                }
+            };
+            Words::new(format!("{seen}: nothing was changed"))
+                .hint(format!("disconnect them, or check only one area: cangauge conform {node} --only sdo"))
+        }
+    }
+}
+
+/// The text for an effect.
+pub(in crate::output) fn effect(node: &str, effect: &ConformEffect) -> NoteText {
+    let undo = format!("cangauge config apply {node} --rollback");
+    match effect {
+        ConformEffect::NotRestored(objects) => {
+            NoteText::new("not-restored", format!("not restored: {}", list(objects))).command("undo", undo)
+        }
+        ConformEffect::Unknown => {
+            NoteText::new("not-restored", "the settings could not be restored").command("undo", undo)
+        }
+    }
+}
+
+/// Objects in one line.
+pub(in crate::output) fn list(objects: &[ObjectId]) -> String {
+    objects.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}

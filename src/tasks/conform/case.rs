@@ -1,0 +1,162 @@
+//! The cases: what each one checks, and what it needs.
+
+use super::finding::Verdict;
+use super::session::Session;
+use crate::node::Error;
+use std::fmt;
+use std::str::FromStr;
+
+/// A group of cases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Area {
+    /// SDO transfers.
+    Sdo,
+    /// The mandatory objects, and the rules for all objects.
+    Od,
+    /// NMT commands and states, boot-up.
+    Nmt,
+    /// Heartbeat and node guarding.
+    ErrorControl,
+}
+
+impl Area {
+    /// All areas, in the order in which they run.
+    pub const ALL: [Area; 4] = [Area::Sdo, Area::Od, Area::Nmt, Area::ErrorControl];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Area::Sdo => "sdo",
+            Area::Od => "od",
+            Area::Nmt => "nmt",
+            Area::ErrorControl => "error-control",
+        }
+    }
+
+    /// One line that describes the area.
+    pub fn title(self) -> &'static str {
+        match self {
+            Area::Sdo => "SDO transfers",
+            Area::Od => "object dictionary",
+            Area::Nmt => "NMT states and boot-up",
+            Area::ErrorControl => "heartbeat and node guarding",
+        }
+    }
+
+    /// Whether the frames of the area are addressed to the node alone. Other nodes are then not affected.
+    pub fn is_local(self) -> bool {
+        match self {
+            Area::Sdo | Area::Od | Area::Nmt | Area::ErrorControl => true,
+        }
+    }
+}
+
+impl fmt::Display for Area {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Area {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Area, String> {
+        let names = || Area::ALL.map(Area::name).join(", ");
+        Area::ALL
+            .into_iter()
+            .find(|area| area.name() == text)
+            .ok_or_else(|| format!("\"{text}\" is not an area (it is one of: {})", names()))
+    }
+}
+
+/// How much a deviation matters to users of the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Wrong data, or the device cannot be used with other devices.
+    High,
+    /// Some tools or masters fail, or need a special setting.
+    Medium,
+    /// It is rarely noticed.
+    Low,
+}
+
+impl Severity {
+    /// The word in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Severity::High => "high",
+            Severity::Medium => "medium",
+            Severity::Low => "low",
+        }
+    }
+}
+
+/// What a case needs besides the node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Needs {
+    /// Nothing.
+    Nothing,
+    /// The node is alone on the bus.
+    SoleNode,
+}
+
+impl Needs {
+    /// The word in lists.
+    pub fn name(self) -> Option<&'static str> {
+        match self {
+            Needs::Nothing => None,
+            Needs::SoleNode => Some("no other node"),
+        }
+    }
+}
+
+/// Runs a case.
+pub(super) type Run = fn(&mut Session<'_, '_>) -> Result<Verdict, Error>;
+
+/// One case. The table of all cases runs them, lists them and is printed in the manual page.
+#[derive(Clone, Copy)]
+pub struct Case {
+    /// The number: `SDO-07`.
+    pub id: &'static str,
+    /// The group.
+    pub area: Area,
+    /// What the case checks, in one sentence.
+    pub sentence: &'static str,
+    /// The document and its part.
+    pub clause: &'static str,
+    /// How much a deviation matters.
+    pub severity: Severity,
+    /// What a deviation means to users of the device.
+    pub meaning: &'static str,
+    /// What the case needs.
+    pub needs: Needs,
+    pub(super) run: Run,
+}
+
+impl Case {
+    pub(super) const fn new(
+        area: Area,
+        id: &'static str,
+        sentence: &'static str,
+        clause: &'static str,
+        run: Run,
+    ) -> Case {
+        Case { id, area, sentence, clause, severity: Severity::Medium, meaning: "", needs: Needs::Nothing, run }
+    }
+
+    /// How much a deviation matters, and what it means to users.
+    pub(super) const fn matters(self, severity: Severity, meaning: &'static str) -> Case {
+        Case { severity, meaning, ..self }
+    }
+
+    /// The case sends frames that concern all nodes.
+    pub(super) const fn alone(self) -> Case {
+        Case { needs: Needs::SoleNode, ..self }
+    }
+}
+
+impl fmt::Debug for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.id)
+    }
+}

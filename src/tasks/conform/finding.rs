@@ -1,0 +1,191 @@
+//! Verdicts: what was expected, and what was seen. The texts are in `output`.
+
+use crate::canopen::frame::Frame;
+use crate::canopen::nmt::NmtState;
+use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::AbortCode;
+use crate::tasks::Failure;
+use std::time::Duration;
+
+/// The result of a case.
+#[derive(Clone, Debug)]
+pub enum Verdict {
+    /// The device behaves as required.
+    Pass,
+    /// The device deviates. There is at least one finding.
+    Deviates(Vec<Finding>),
+    /// The case was run or tried, without a result.
+    NotJudged(Box<WhyNot>),
+    /// The device does not have the feature, or the case was not allowed to run.
+    NotApplicable(WhyNot),
+}
+
+/// A deviation: what was expected, and what was seen instead.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// The object of the request.
+    pub object: Option<ObjectId>,
+    /// What was expected.
+    pub expected: Expected,
+    /// What was seen.
+    pub seen: Seen,
+}
+
+/// What the standard requires.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expected {
+    /// One of these abort codes.
+    Abort(&'static [u32]),
+    /// An SDO answer with one of these command specifiers for the object of the request.
+    Command(&'static [u8]),
+    /// A segment with the toggle bit of the request.
+    Segment,
+    /// A frame with eight bytes.
+    EightBytes,
+    /// No answer.
+    NoAnswer,
+    /// Any answer.
+    Answer,
+    /// An entry with this sub-index, because sub-index 0 names it as the highest.
+    Entry,
+    /// These bytes.
+    Bytes(Vec<u8>),
+    /// Other bytes than these.
+    OtherBytes(Vec<u8>),
+    /// A CAN-ID that is not restricted.
+    OtherCanId,
+    /// Zeros in the unused bytes.
+    ZeroPadding,
+    /// A size of this many bytes.
+    Size(usize),
+    /// This CRC.
+    Crc(u16),
+    /// A number in this range.
+    Range(u64, u64),
+    /// Printable text.
+    Text,
+    /// This NMT state.
+    State(NmtState),
+    /// PRE-OPERATIONAL, or OPERATIONAL if the device starts by itself.
+    StateAfterBoot,
+    /// One boot-up message with one byte 00h.
+    BootUp,
+    /// A heartbeat or guarding answer of one byte.
+    OneByte,
+    /// This many frames.
+    Frames(usize),
+    /// This period.
+    Period(Duration),
+    /// A frame within this time.
+    Within(Duration),
+    /// The state, with a toggle bit that alternates.
+    AlternatingToggle,
+    /// The state, with the toggle bit 0.
+    FirstToggle,
+    /// PRE-OPERATIONAL, or an emergency with code 8130h.
+    LifeGuardingEvent,
+    /// Bit 0 is set if another bit is set.
+    GenericErrorBit,
+}
+
+/// What was seen.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Seen {
+    /// An abort code.
+    Abort(AbortCode),
+    /// A frame.
+    Frame(Frame),
+    /// Nothing within this time.
+    Nothing(Duration),
+    /// These bytes.
+    Bytes(Vec<u8>),
+    /// A number.
+    Number(u64),
+    /// This state; `None` if no state was received.
+    State(Option<NmtState>),
+    /// This many frames.
+    Frames(usize),
+    /// This mean period.
+    Period(Duration),
+    /// A CRC.
+    Crc(u16),
+    /// A first frame after this time.
+    After(Duration),
+}
+
+/// Why a case has no verdict.
+#[derive(Clone, Debug)]
+pub enum WhyNot {
+    /// The device does not have the object.
+    NoObject(ObjectId),
+    /// No object of the device is suitable, as far as its objects are known.
+    NoSuitableObject,
+    /// The device does not support this kind of transfer.
+    NoSegments,
+    /// The device does not support block transfer.
+    NoBlocks,
+    /// The device rejects another value of this object, so that nothing can be changed.
+    NotWritable(ObjectId),
+    /// The node does not send heartbeats, and has no node guarding.
+    NoState,
+    /// The device does not answer node guarding.
+    NoGuarding,
+    /// The error history has entries, which the case would change.
+    ErrorHistory,
+    /// The bus carries no remote frames.
+    NoRemoteFrames,
+    /// Other nodes are on the bus.
+    NotAlone,
+    /// A request failed.
+    Failed(Box<Failure>),
+}
+
+impl Verdict {
+    /// Pass, or a deviation with these findings.
+    pub(super) fn of(findings: impl IntoIterator<Item = Finding>) -> Verdict {
+        let findings: Vec<Finding> = findings.into_iter().collect();
+        if findings.is_empty() { Verdict::Pass } else { Verdict::Deviates(findings) }
+    }
+
+    pub(super) fn not_judged(why: WhyNot) -> Verdict {
+        Verdict::NotJudged(Box::new(why))
+    }
+
+    /// The word in reports.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Verdict::Pass => "pass",
+            Verdict::Deviates(_) => "deviates",
+            Verdict::NotJudged(_) => "not-judged",
+            Verdict::NotApplicable(_) => "not-applicable",
+        }
+    }
+}
+
+impl Finding {
+    pub(super) fn new(expected: Expected, seen: Seen) -> Finding {
+        Finding { object: None, expected, seen }
+    }
+
+    pub(super) fn at(object: ObjectId, expected: Expected, seen: Seen) -> Finding {
+        Finding { object: Some(object), expected, seen }
+    }
+}
+
+impl Seen {
+    /// An answer, or nothing within the time.
+    pub(super) fn answer(answer: Option<Frame>, timeout: Duration) -> Seen {
+        match answer {
+            Some(frame) => abort_code(&frame).map_or(Seen::Frame(frame), Seen::Abort),
+            None => Seen::Nothing(timeout),
+        }
+    }
+}
+
+/// The abort code of an SDO answer.
+pub(super) fn abort_code(frame: &Frame) -> Option<AbortCode> {
+    match frame.data() {
+        [0x80, _, _, _, a, b, c, d] => Some(AbortCode(u32::from_le_bytes([*a, *b, *c, *d]))),
+        _ => None,
+    }
+}

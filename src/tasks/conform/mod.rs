@@ -1,0 +1,253 @@
+//! Checks a device against CiA 301, CiA 305 and CiA 404.
+//!
+//! One table of [`Case`]s runs the cases, lists them and is printed in the manual page. Each case returns a
+//! [`Verdict`]. What a case changes is restored after it.
+
+mod alone;
+mod case;
+mod codes;
+mod error_control;
+mod failure;
+mod finding;
+mod nmt;
+mod od;
+mod sdo;
+mod session;
+mod settings;
+
+pub use case::{Area, Case, Needs, Severity};
+pub use failure::{ConformEffect, ConformFailure};
+pub use finding::{Expected, Finding, Seen, Verdict, WhyNot};
+
+use crate::bus::{Filters, Stamp};
+use crate::canopen::id::NodeId;
+use crate::canopen::nmt::{NmtCommand, NmtState};
+use crate::canopen::object::ObjectId;
+use crate::device::description::Deviation;
+use crate::master::Master;
+pub use crate::master::{Exchanged, Transcript};
+use crate::node::{Error, Node, Overrides, state};
+use crate::tasks::config::{self, Journal};
+use crate::tasks::{Failure, Kind};
+use session::Session;
+use settings::Settings;
+use std::time::Duration;
+
+/// All cases, in the order in which they run.
+pub fn cases() -> impl Iterator<Item = &'static Case> {
+    let sdo = [sdo::CASES, sdo::segments::CASES, sdo::general::CASES, sdo::blocks::CASES];
+    sdo.into_iter().chain([od::CASES, nmt::CASES, error_control::CASES]).flatten()
+}
+
+/// What to check.
+#[derive(Clone, Debug, Default)]
+pub struct ConformOptions {
+    /// Run only the cases of this area.
+    pub only: Option<Area>,
+    /// The numbers of cases that are not run.
+    pub skip: Vec<String>,
+}
+
+impl ConformOptions {
+    /// The cases to run.
+    pub fn selected(&self) -> impl Iterator<Item = &'static Case> + '_ {
+        cases()
+            .filter(|case| self.only.is_none_or(|area| case.area == area))
+            .filter(|case| !self.skip.iter().any(|id| id == case.id))
+    }
+}
+
+/// The result of one case.
+#[derive(Clone, Debug)]
+pub struct CaseResult {
+    /// The case.
+    pub case: &'static Case,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The page of the manual that documents this deviation.
+    pub known: Option<String>,
+    /// The frames of the case.
+    pub transcript: Transcript,
+    /// How long it took.
+    pub length: Duration,
+    /// Settings that do not have the values from before the case.
+    pub not_restored: Vec<ObjectId>,
+}
+
+impl CaseResult {
+    /// Whether the device deviates in a way that its manual does not state.
+    pub fn is_new_deviation(&self) -> bool {
+        matches!(self.verdict, Verdict::Deviates(_)) && self.known.is_none()
+    }
+}
+
+/// The NMT state after the check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StateAfter {
+    /// No NMT command was sent.
+    Unchanged,
+    /// The state from before.
+    Restored(NmtState),
+    /// The state from before is unknown; the node is PRE-OPERATIONAL.
+    Unknown,
+}
+
+/// The result of a check.
+#[derive(Clone, Debug)]
+pub struct ConformReport {
+    /// The node.
+    pub node: Node,
+    /// When the first case started.
+    pub started: Stamp,
+    /// How long the cases took.
+    pub length: Duration,
+    /// The results, in the order of the cases.
+    pub results: Vec<CaseResult>,
+    /// Settings that do not have the values from before.
+    pub not_restored: Vec<ObjectId>,
+    /// The NMT state.
+    pub state: StateAfter,
+}
+
+/// Runs the cases on a node, and restores its settings and its NMT state.
+///
+/// # Errors
+/// - Other nodes are on the bus.
+/// - The node does not answer.
+/// - Bus errors and Ctrl-C. The failure names the settings that could not be restored.
+pub fn conform(
+    master: &mut Master<'_>,
+    id: NodeId,
+    overrides: &Overrides,
+    options: &ConformOptions,
+    journal: &mut dyn Journal,
+    observe: &mut dyn FnMut(&CaseResult),
+) -> Result<ConformReport, Failure> {
+    let before = config::read(master, id, overrides, None)?;
+    master.listen(&Filters::All)?;
+    let is_local = options.selected().all(|case| case.area.is_local());
+    let is_alone = match alone::others(master, &before.node)? {
+        None => true,
+        Some(_) if is_local && options.only.is_some() => false,
+        Some(failure) => return Err(Failure::at(id, failure)),
+    };
+    journal.begin(&before)?;
+    let mut session = Session {
+        master,
+        node: before.node,
+        is_alone,
+        settings: Settings::default(),
+        initial_state: None,
+        used_nmt: false,
+        state_open: false,
+        guarded: false,
+        open_transfer: None,
+    };
+    session.read_settings()?;
+    let started = session.master.bus().now();
+    let run = session.begin().map_err(Failure::from).and_then(|()| session.run(options, observe));
+    let restored = session.restore();
+    let state = session.restore_state();
+    let length = session.master.now().since(started.mono);
+    if restored.as_ref().is_ok_and(Vec::is_empty) {
+        journal.finish();
+    }
+    match (run, restored, state) {
+        (Ok(results), Ok(not_restored), Ok(state)) => {
+            Ok(ConformReport { node: session.node, started, length, results, not_restored, state })
+        }
+        (Ok(_), Err(error), _) | (Ok(_), Ok(_), Err(error)) => {
+            Err(Failure::from(error).with(id, ConformEffect::Unknown))
+        }
+        (Err(failure), Ok(objects), _) if objects.is_empty() => Err(failure),
+        (Err(failure), Ok(objects), _) => Err(failure.with(id, ConformEffect::NotRestored(objects))),
+        (Err(failure), Err(_), _) => Err(failure.with(id, ConformEffect::Unknown)),
+    }
+}
+
+impl Session<'_, '_> {
+    /// Finds out the NMT state, so that it can be restored.
+    fn begin(&mut self) -> Result<(), Error> {
+        self.initial_state = state::state(self.master, self.node.id)?;
+        self.master.listen(&Filters::All)?;
+        if self.initial_state.is_none() && self.show_states()? {
+            self.initial_state = self.await_state(NmtState::PreOperational)?;
+        }
+        self.restore().map(drop)
+    }
+
+    fn run(
+        &mut self,
+        options: &ConformOptions,
+        observe: &mut dyn FnMut(&CaseResult),
+    ) -> Result<Vec<CaseResult>, Failure> {
+        let mut results = Vec::new();
+        for case in options.selected() {
+            let started = self.master.now();
+            self.master.start_transcript();
+            let verdict = if case.needs == Needs::SoleNode && !self.is_alone {
+                Ok(Verdict::NotApplicable(WhyNot::NotAlone))
+            } else {
+                (case.run)(self)
+            };
+            let transcript = self.master.take_transcript();
+            let length = self.master.now().since(started);
+            let verdict = match verdict {
+                Err(error) if error.is_fatal() => return Err(error.into()),
+                Err(error) => Verdict::not_judged(WhyNot::Failed(Box::new(error.into()))),
+                Ok(verdict) => verdict,
+            };
+            let not_restored = self.restore()?;
+            let known = self.known(case.id, &verdict);
+            let result = CaseResult { case, verdict, known, transcript, length, not_restored };
+            observe(&result);
+            results.push(result);
+            self.check_alive()?;
+        }
+        Ok(results)
+    }
+
+    /// The pages of the manual that document all findings of a case.
+    fn known(&self, case: &str, verdict: &Verdict) -> Option<String> {
+        let Verdict::Deviates(findings) = verdict else { return None };
+        let deviations = &self.node.model.as_ref()?.description.deviations;
+        let mut pages: Vec<&str> = Vec::new();
+        for finding in findings {
+            let is_this = |at: &ObjectId| finding.object.is_some_and(|object| object.index == at.index);
+            let covers = |known: &&Deviation| {
+                known.case == case && (known.objects.is_empty() || known.objects.iter().any(is_this))
+            };
+            let page = deviations.iter().find(covers)?.page.as_str();
+            if !pages.contains(&page) {
+                pages.push(page);
+            }
+        }
+        Some(pages.join(", "))
+    }
+
+    /// Ends the check if the node does not answer any more.
+    fn check_alive(&mut self) -> Result<(), Failure> {
+        match self.read(ObjectId::DEVICE_TYPE) {
+            Err(Error::Sdo(error)) if Failure::from(error.clone()).kind() == Kind::NoAnswer => Err(error.into()),
+            Err(error) if error.is_fatal() => Err(error.into()),
+            Ok(_) | Err(_) => Ok(()),
+        }
+    }
+
+    /// Returns the node to the state from before.
+    fn restore_state(&mut self) -> Result<StateAfter, Error> {
+        if !self.used_nmt {
+            return Ok(StateAfter::Unchanged);
+        }
+        let command = match self.initial_state {
+            Some(NmtState::Operational) => NmtCommand::Start,
+            Some(NmtState::Stopped) => NmtCommand::Stop,
+            Some(_) | None => NmtCommand::EnterPreOperational,
+        };
+        let mut sent = self.command(command);
+        if matches!(sent, Err(Error::Interrupted)) {
+            sent = self.command(command);
+        }
+        sent.map(|()| self.initial_state.map_or(StateAfter::Unknown, StateAfter::Restored))
+    }
+}

@@ -1,0 +1,53 @@
+//! `cangauge conform`. The cases themselves: `tests/scenarios/conform.rs`.
+
+use super::Bench;
+use serde_json::json;
+
+#[test]
+fn known_deviations_are_named_with_their_page_and_are_no_failure() {
+    let done = Bench::of("mh4@1").run("conform 1").exit(0);
+    assert!(done.stdout.contains("known: the manual states it (page 4.1.8, 4.1.9, 4.2.4, 4.2.5)"), "{}", done.stdout);
+    assert!(done.stdout.starts_with("SDO-01  pass            A read of 1000h"), "{}", done.stdout);
+    assert!(done.stderr.contains("node 1: 64 cases in"), "{}", done.stderr);
+}
+
+#[test]
+fn deviation_is_a_failed_check() {
+    // Another program set a restricted COB-ID.
+    let bench = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x1014\" = 0x701 }\n");
+    let done = bench.run("conform 1 --only od --format json").exit(1);
+    let rows = done.json();
+    let row = rows.iter().find(|row| row["case"] == "OD-09").expect("the case");
+    assert_eq!((&row["verdict"], &row["severity"], &row["known"]), (&json!("deviates"), &json!("high"), &json!(null)));
+    assert_eq!(row["details"], json!(["0x1014:0: expected another CAN-ID; seen: the bytes 01 07 00 00"]));
+    assert!(row["frames"].as_array().is_some_and(|frames| frames.contains(&json!("> 601#4014100000000000"))), "{row}");
+    assert!(done.stderr.ends_with("{\"error\":{\"kind\":\"check-failed\",\"exit\":1,\"message\":\"1 deviation\",\"node\":null,\"object\":null,\"abort\":null,\"hint\":null}}\n"), "{}", done.stderr);
+}
+
+#[test]
+fn other_nodes_are_a_reason_to_refuse() {
+    let bench = Bench::of("mh4@1,dps@127");
+    let done = bench.run("conform 1").exit(1);
+    assert_eq!(
+        done.stderr,
+        "cangauge: node 1: node 127 is on the bus, too: nothing was changed\n\
+         hint: disconnect them, or check only one area: cangauge conform 1 --only sdo\n"
+    );
+    bench.run("conform 1 --only sdo").exit(0);
+}
+
+#[test]
+fn dry_run_lists_the_cases_and_uses_no_bus() {
+    let bench = Bench::of("mh4@1");
+    let done = bench.run("conform 1 --only sdo --skip sdo-07 --dry-run").exit(0);
+    assert_eq!(done.frames, [""; 0]);
+    assert!(
+        done.stdout.starts_with("CASE    AREA  NEEDS          WHAT\nSDO-01  sdo   -              A read of"),
+        "{}",
+        done.stdout
+    );
+    assert!(!done.stdout.contains("SDO-07") && !done.stdout.contains("NMT-01"), "{}", done.stdout);
+    bench.run("conform 1 --skip SDO-99").exit(2);
+    bench.run("conform 1,2").exit(2);
+    bench.run("conform 1 --only everything").exit(2);
+}

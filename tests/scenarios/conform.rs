@@ -1,0 +1,181 @@
+//! `conform` on the simulated devices, with one deviation each, and interrupted at every frame.
+
+mod deviant;
+mod table;
+
+use super::pdo_map::{Fault, FaultyBus};
+use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::bus::{Bus, Event, Mono};
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::object::ObjectId;
+use cangauge::device::catalog::{Model, by_name};
+use cangauge::device::scalar::Scalar;
+use cangauge::master::{Master, Timing};
+use cangauge::node::Overrides;
+use cangauge::output::conform::finding;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::sim::{Device, Setup, State};
+use cangauge::tasks::config::{Journal, Snapshot};
+use cangauge::tasks::conform::{Area, ConformOptions, ConformReport, Verdict, cases, conform};
+use cangauge::tasks::{Failure, Kind};
+use deviant::{Deviant, Deviation, NODE};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, LazyLock};
+use std::time::Duration;
+
+struct NoJournal;
+
+impl Journal for NoJournal {
+    fn begin(&mut self, _: &Snapshot) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn finish(&mut self) {}
+}
+
+fn node() -> NodeId {
+    NodeId::new(NODE).expect("a node-ID")
+}
+
+/// A device with block transfer.
+static LARGE: LazyLock<Arc<Model>> =
+    LazyLock::new(|| Arc::new(Model::from_toml(include_str!("../engine/large.toml")).expect("a description")));
+
+fn model(kind: &str) -> Arc<Model> {
+    if kind == "large" { Arc::clone(&LARGE) } else { by_name(kind).expect("built in") }
+}
+
+fn bus(kind: &str, deviation: Option<Deviation>) -> MemoryBus {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    let mut setup = Setup::new(model(kind), node());
+    if kind == "large" {
+        setup.set.push((ObjectId::new(0x1018, 1), Scalar::Integer(71)));
+    }
+    bus.attach(Deviant::new(model(kind), Device::new(setup).expect("a device"), deviation));
+    while bus.receive(Mono::at(Duration::from_millis(20))).expect("the bus works") != Event::Timeout {}
+    bus
+}
+
+fn run(bus: &mut dyn Bus, kind: &str, options: &ConformOptions) -> Result<ConformReport, Failure> {
+    let mut master = Master::new(bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
+    let overrides: Overrides = if kind == "large" { [(node(), model(kind))].into() } else { Overrides::new() };
+    conform(&mut master, node(), &overrides, options, &mut NoJournal, &mut |_| {})
+}
+
+fn checked(bus: &mut dyn Bus, kind: &str) -> ConformReport {
+    run(bus, kind, &ConformOptions::default()).unwrap_or_else(|failure| panic!("{kind}: {failure}"))
+}
+
+/// The cases with a deviation that the manual does not state, with their findings.
+fn deviations(report: &ConformReport) -> Vec<(&'static str, Vec<String>)> {
+    let new = report.results.iter().filter(|result| result.is_new_deviation());
+    new.map(|result| match &result.verdict {
+        Verdict::Deviates(findings) => (result.case.id, findings.iter().map(finding).collect()),
+        _ => (result.case.id, Vec::new()),
+    })
+    .collect()
+}
+
+/// The value of each writable object, and the NMT state.
+type Contents = (BTreeMap<ObjectId, Vec<u8>>, Option<State>);
+
+fn differences(bus: &mut MemoryBus, before: &Contents) -> Vec<String> {
+    let (values, state) = contents(bus);
+    let changed = values.into_iter().filter(|(object, value)| before.0.get(object) != Some(value));
+    let state = (state != before.1).then(|| format!("{state:?}"));
+    changed.map(|(object, value)| format!("{object} {value:02x?}")).chain(state).collect()
+}
+
+fn contents(bus: &mut MemoryBus) -> Contents {
+    let now = bus.mono();
+    let station = bus.stations_mut::<Deviant>().next().expect("the device");
+    let writable = station.model.dictionary.iter().filter(|entry| entry.access.is_writable());
+    let objects: Vec<ObjectId> = writable.map(|entry| entry.object).collect();
+    let values = objects.into_iter().filter_map(|object| Some((object, station.device.value(object, now)?))).collect();
+    (values, station.device.state())
+}
+
+#[test]
+fn simulated_devices_have_only_the_deviations_of_their_manuals() {
+    let known = [
+        ("mh4", &[("OD-05", "4.1.8, 4.1.9, 4.2.4, 4.2.5")][..]),
+        ("d20", &[("SDO-08", "7"), ("SDO-09", "7"), ("OD-05", "16")]),
+        ("mc1609", &[]),
+        ("dps", &[("SDO-08", "table 23"), ("SDO-09", "table 23")]),
+        ("hydac", &[]),
+        ("large", &[]),
+    ];
+    for (kind, expected) in known {
+        let mut bus = bus(kind, None);
+        let before = contents(&mut bus);
+        let report = checked(&mut bus, kind);
+        assert_eq!(deviations(&report), [], "{kind}");
+        let found = report.results.iter().filter_map(|result| Some((result.case.id, result.known.as_deref()?)));
+        assert_eq!(found.collect::<Vec<_>>(), expected, "{kind}");
+        assert_eq!(report.not_restored, [], "{kind}");
+        assert!(report.length < Duration::from_secs(60), "{kind}: {:?}", report.length);
+        assert_eq!(differences(&mut bus, &before), [""; 0], "{kind}");
+    }
+}
+
+#[test]
+fn each_deviation_is_found_by_its_case_and_by_no_other() {
+    let rows = [table::SDO, table::OD, table::NMT, table::ERROR_CONTROL].concat();
+    let (mut wrong, mut found) = (Vec::new(), BTreeSet::new());
+    for (kind, case, deviation) in rows {
+        let mut bus = bus(kind, Some(deviation));
+        let report = checked(&mut bus, kind);
+        let deviations = deviations(&report);
+        if deviations.len() != 1 || deviations[0].0 != case {
+            wrong.push(format!("{kind} {case}: {deviations:?}"));
+        }
+        found.insert(case);
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let missing: Vec<&str> = cases().map(|case| case.id).filter(|id| !found.contains(id)).collect();
+    assert_eq!(missing, [""; 0], "each case has a deviation");
+}
+
+#[test]
+fn other_nodes_are_a_reason_to_refuse() {
+    let mut bus = bus("mh4", None);
+    let other = Setup::new(model("d20"), NodeId::new(9).expect("a node-ID"));
+    bus.attach(Device::new(other).expect("a device"));
+    let failure = run(&mut bus, "mh4", &ConformOptions::default()).expect_err("another node");
+    assert_eq!(failure.kind(), Kind::CheckFailed);
+    let message = ErrorMessage::of(&failure).message;
+    assert_eq!(message, "node 5: node 9 is on the bus, too: nothing was changed");
+    let only = ConformOptions { only: Some(Area::Sdo), ..ConformOptions::default() };
+    let report = run(&mut bus, "mh4", &only).expect("only SDO");
+    let alone = report.results.iter().find(|result| result.case.id == "SDO-24").expect("the case");
+    assert!(matches!(alone.verdict, Verdict::NotApplicable(_)), "{:?}", alone.verdict);
+    assert_eq!(deviations(&report), []);
+}
+
+/// Ctrl-C after each frame of an area. The device has its old settings and its old state.
+#[test]
+fn an_interrupted_check_restores_the_device() {
+    for area in Area::ALL {
+        let options = ConformOptions { only: Some(area), ..ConformOptions::default() };
+        for kind in ["mh4", "mc1609"] {
+            let mut clean = FaultyBus::new(bus(kind, None), Fault::None, 0);
+            let before = contents(&mut clean.bus);
+            run(&mut clean, kind, &options).expect("a report");
+            let count = clean.sent.len();
+            // The first frames search the bus for other nodes.
+            for at in (260..count).step_by(if kind == "mh4" { 5 } else { 37 }) {
+                let case = format!("{kind} {area} interrupted at {at} of {count}: {}", clean.sent[at]);
+                let mut faulty = FaultyBus::new(bus(kind, None), Fault::Interrupt, at);
+                let result = run(&mut faulty, kind, &options);
+                let mut bus = faulty.bus;
+                let until = Mono::at(bus.mono().since_start() + Duration::from_secs(2));
+                while bus.receive(until).expect("the bus works") != Event::Timeout {}
+                match result {
+                    Ok(report) => assert_eq!(report.not_restored, [], "{case}"),
+                    Err(failure) => assert_eq!(failure.kind(), Kind::Interrupted, "{case}: {failure}"),
+                }
+                assert_eq!(differences(&mut bus, &before), [""; 0], "{case}");
+            }
+        }
+    }
+}

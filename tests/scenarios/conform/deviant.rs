@@ -1,0 +1,150 @@
+//! A simulated device that deviates from the standard in one point.
+
+use cangauge::bus::Mono;
+use cangauge::bus::memory::{Outbox, Station, Tuning};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::CanId;
+use cangauge::device::catalog::Model;
+use cangauge::sim::Device;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The node-ID of the device.
+pub(super) const NODE: u8 = 5;
+
+/// The facts that a deviation may depend on.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory {
+    /// The last SDO request, before the present one.
+    pub(super) last: Option<[u8; 8]>,
+    /// The present SDO request.
+    pub(super) request: Option<[u8; 8]>,
+    /// The command of the last block initiate.
+    pub(super) initiate: u8,
+    /// The bytes of the last block segment.
+    pub(super) segment: [u8; 2],
+    /// The last two NMT commands to this node.
+    pub(super) nmt: [u8; 2],
+    /// When the last boot-up message was sent.
+    pub(super) booted: Option<Duration>,
+    /// The last values written to 1017h, the newest first.
+    pub(super) periods: [u16; 2],
+    /// Counts for the deviation itself.
+    pub(super) count: u32,
+}
+
+/// A deviation. Each function gets what the device has received or sends.
+#[derive(Clone, Copy)]
+pub(super) enum Deviation {
+    /// Answers an SDO request in place of the device; `None`: the device answers.
+    Answers(fn(&mut Memory, [u8; 8]) -> Option<[u8; 8]>),
+    /// Ignores a received frame.
+    Ignores(fn(&mut Memory, Duration, &Frame) -> bool),
+    /// Takes a received frame for another one.
+    Takes(fn(&mut Memory, &Frame) -> Frame),
+    /// Changes a frame that it sends.
+    Sends(fn(&mut Memory, Frame) -> Vec<Frame>),
+    /// Both: takes a frame for another one, and changes what it sends.
+    Both(fn(&mut Memory, &Frame) -> Frame, fn(&mut Memory, Frame) -> Vec<Frame>),
+}
+
+/// A device with a deviation.
+pub(super) struct Deviant {
+    pub(super) model: Arc<Model>,
+    pub(super) device: Device,
+    deviation: Option<Deviation>,
+    memory: Memory,
+}
+
+impl Deviant {
+    pub(super) fn new(model: Arc<Model>, device: Device, deviation: Option<Deviation>) -> Deviant {
+        Deviant { model, device, deviation, memory: Memory::default() }
+    }
+
+    fn note(&mut self, frame: &Frame) {
+        let memory = &mut self.memory;
+        if frame.id().number() == 0x600 + u32::from(NODE)
+            && let Some(request) = frame.all_eight()
+        {
+            memory.last = memory.request.replace(request);
+            match request {
+                [command @ (0xa0 | 0xa4 | 0xc2 | 0xc6), ..] => memory.initiate = command,
+                [0x81, a, b, ..] => memory.segment = [a, b],
+                [0x22 | 0x2b, 0x17, 0x10, 0, low, high, ..] | [0x0b, low, high, ..] => {
+                    memory.periods = [u16::from_le_bytes([low, high]), memory.periods[0]];
+                    memory.count = 0;
+                }
+                _ => {}
+            }
+        }
+        if let (CanId::NMT, [command, NODE]) = (frame.id(), frame.data()) {
+            memory.nmt = [*command, memory.nmt[0]];
+        }
+    }
+
+    /// Passes the frames of the device to the bus.
+    fn send(&mut self, now: Mono, inner: &mut Outbox, out: &mut Outbox) {
+        while let Some(frame) = inner.pop() {
+            if frame.id().number() == 0x700 + u32::from(NODE) && frame.data() == [0] {
+                self.memory.booted = Some(now.since_start());
+            }
+            match self.deviation {
+                Some(Deviation::Sends(change) | Deviation::Both(_, change)) => {
+                    change(&mut self.memory, frame).into_iter().for_each(|frame| out.send(frame));
+                }
+                _ => out.send(frame),
+            }
+        }
+    }
+}
+
+impl Station for Deviant {
+    fn power_on(&mut self, now: Mono, out: &mut Outbox) {
+        let mut inner = Outbox::default();
+        self.device.power_on(now, &mut inner);
+        self.send(now, &mut inner, out);
+    }
+
+    fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        let mut frame = *frame;
+        self.note(&frame);
+        let request = frame.all_eight().filter(|_| frame.id().number() == 0x600 + u32::from(NODE));
+        match (self.deviation, request) {
+            (Some(Deviation::Answers(answer)), Some(request)) => {
+                if let Some(answer) = answer(&mut self.memory, request) {
+                    let id = CanId::standard(0x580 + u16::from(NODE)).expect("an identifier");
+                    out.send(Frame::full(id, answer));
+                    return;
+                }
+            }
+            (Some(Deviation::Ignores(ignores)), _) if ignores(&mut self.memory, now.since_start(), &frame) => return,
+            (Some(Deviation::Takes(take) | Deviation::Both(take, _)), _) => frame = take(&mut self.memory, &frame),
+            _ => {}
+        }
+        let mut inner = Outbox::default();
+        self.device.receive(now, &frame, &mut inner);
+        self.send(now, &mut inner, out);
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        let mut inner = Outbox::default();
+        self.device.wake(now, &mut inner);
+        self.send(now, &mut inner, out);
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.device.next_wake()
+    }
+
+    fn sent(&mut self, now: Mono, frame: &Frame) {
+        self.device.sent(now, frame);
+    }
+
+    fn tuning(&self) -> Tuning {
+        self.device.tuning()
+    }
+
+    fn on_bus_bit_rate(&mut self, bit_rate: u32) {
+        self.device.on_bus_bit_rate(bit_rate);
+    }
+}
