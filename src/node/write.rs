@@ -150,12 +150,24 @@ pub fn write_and_verify(
     data_type: DataType,
 ) -> Result<Written, Error> {
     let written = write(master, node, object, data)?;
+    verify(master, node, object, data, data_type)?;
+    Ok(written)
+}
+
+/// Reads an object and compares it with the written bytes.
+///
+/// # Errors
+/// The read failed; [`Error::NotKept`] if the object has a different value.
+pub fn verify(
+    master: &mut Master<'_>,
+    node: &Node,
+    object: ObjectId,
+    data: &[u8],
+    data_type: DataType,
+) -> Result<(), Error> {
     let found = master.read(node.id, object, data_type)??;
-    let wanted = shown(data, data_type);
-    if found == wanted {
-        return Ok(written);
-    }
-    Err(Error::NotKept { node: node.id, object, written: wanted, found })
+    let written = shown(data, data_type);
+    if found == written { Ok(()) } else { Err(Error::NotKept { node: node.id, object, written, found }) }
 }
 
 /// Whether these bytes are a signature: "save", "load", "zero", "tara", or a number with "set".

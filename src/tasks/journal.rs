@@ -99,19 +99,24 @@ impl TemporaryWrite {
                 return Ok(Undone::OtherDevice);
             }
         }
-        let Ok(answer) = master.transfer_one(Request::read(self.node, self.object))? else {
-            return Ok(Undone::NotRestored);
-        };
-        let found = answer.uploaded.map(|uploaded| uploaded.bytes).unwrap_or_default();
-        // A device that does not indicate the size sends four bytes for every type.
-        if !found.starts_with(&self.written) {
-            return Ok(Undone::ChangedSince);
+        match self.holds(master, &self.written)? {
+            Some(true) => {}
+            Some(false) => return Ok(Undone::ChangedSince),
+            None => return Ok(Undone::NotRestored),
         }
         match write(master, &Node::new(self.node), self.object, &self.before) {
-            Ok(_) => Ok(Undone::Restored),
+            Ok(_) if self.holds(master, &self.before)? == Some(true) => Ok(Undone::Restored),
             Err(Error::Bus(error)) => Err(MasterError::Bus(error)),
             Err(Error::Interrupted) => Err(MasterError::Interrupted),
-            Err(_) => Ok(Undone::NotRestored),
+            Ok(_) | Err(_) => Ok(Undone::NotRestored),
         }
+    }
+
+    /// Whether the object has this value. `None` if it cannot be read. A device that does not indicate the size sends
+    /// four bytes for every type.
+    fn holds(&self, master: &mut Master<'_>, bytes: &[u8]) -> Result<Option<bool>, MasterError> {
+        let answer = master.transfer_one(Request::read(self.node, self.object))?;
+        let found = answer.ok().and_then(|answer| answer.uploaded).map(|uploaded| uploaded.bytes);
+        Ok(found.map(|found| found.starts_with(bytes)))
     }
 }

@@ -5,9 +5,9 @@ use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::{Bus, Mono};
 use cangauge::canopen::frame::Frame;
-use cangauge::canopen::id::NodeId;
+use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
-use cangauge::canopen::sdo::DownloadSize;
+use cangauge::canopen::sdo::{BlockUpload, DownloadSize, Progress, TransferError};
 use cangauge::canopen::value::DataType;
 use cangauge::canopen::wire_length::frame_time;
 use cangauge::device::catalog::Model;
@@ -414,4 +414,17 @@ fn a_megabyte_is_transferred_in_both_directions() {
     let found = read(&mut bus, DOMAIN, None, BlockMode::Auto);
     assert_eq!(kind(&found), TransferKind::Blocks);
     assert!(bytes(found) == data);
+}
+
+/// One changed bit makes an expedited answer without a size (46h) of the start of a block transfer (C6h).
+#[test]
+fn changed_answer_to_a_block_request_is_no_value() {
+    for command in [0x46, 0x4a, 0x4e] {
+        let object = ObjectId::new(0x2000, 0);
+        let (mut upload, mut frames) = (BlockUpload::new(node(5), object, 28, false), Vec::new());
+        let answer = Frame::full(CanId::sdo_response(node(5)), [command, 0, 0x20, 0, 4, 0, 0, 0]);
+        let progress = upload.on_frame(&answer, &mut frames);
+        assert!(matches!(progress, Progress::Failed(TransferError::Violation(..))), "{command:x}: {progress:?}");
+        assert_eq!(frames.last().map(|frame| frame.data()[0]), Some(0x80), "aborted");
+    }
 }

@@ -297,7 +297,7 @@ class Sensor(Worker):
         def truth(done):
             return self.rows(done) or self.local.nmt.state != self.state and self.heartbeat and f"state {self.local.nmt.state}, not {self.state}"
 
-        return Operation(["-f", "json", "log", self.node, "--count", 6], truth)
+        return Operation(["-f", "json", "log", self.node, "--count", 6, "--start"], truth)
 
     def check(self):
         return Operation(["check", self.node, "ch1 < 100000"], lambda _: None) if self.kind.name.endswith("switch") else self.value()

@@ -1,7 +1,8 @@
 //! `nmt state --probe` switches the heartbeat on for a moment. Ctrl-C at any time restores 1017h.
 
-use cangauge::bus::Mono;
 use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::bus::{BitRateControl, Bus, BusError, Mono};
+use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::device::catalog;
@@ -42,7 +43,7 @@ fn after_probe_with(before: i64, interrupts: &[u64]) -> (Vec<u8>, bool) {
 #[test]
 fn ctrl_c_at_any_time_restores_the_heartbeat() {
     // A request and its answer take 42 ms. A second answer is awaited once, for 20 ms. After the heartbeat, the probe
-    // cannot be interrupted any more.
+    // cannot be interrupted any more: 1017h is written and read back.
     for at in 1..200 {
         assert_eq!(after_probe(&[at]), (vec![0, 0], at < 162), "interrupted at {at} ms");
         assert_eq!(after_probe(&[at, at + 9, at + 30]).0, [0, 0], "three times from {at} ms");
@@ -84,6 +85,58 @@ fn bus_of(kind: &str, heartbeat: i64) -> MemoryBus {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(Device::new(setup).expect("a device"));
     bus
+}
+
+/// Sets bit 4 of the heartbeat time in the writes with these numbers, as a disturbed wire does.
+struct Flipping<B> {
+    bus: B,
+    writes: u32,
+    flipped: std::ops::Range<u32>,
+}
+
+impl<B: Bus> Bus for Flipping<B> {
+    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live sends_remote_frames waits now mono listen receive
+        receive_buffer late_drops finish);
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let mut data = frame.data().to_vec();
+        if let [0x20..0x40, 0x17, 0x10, 0, low, ..] = &mut data[..] {
+            *low |= if self.flipped.contains(&self.writes) { 0x10 } else { 0 };
+            self.writes += 1;
+        }
+        self.bus.send(&Frame::new(frame.id(), &data).expect("a frame"))
+    }
+}
+
+impl<B: Bus> BitRateControl for Flipping<B> {
+    cangauge::bus::delegate_bus!(self, self.bus => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
+/// The first write sets the heartbeat of the probe, the following ones restore it.
+#[test]
+fn heartbeat_is_restored_again_after_a_wrong_write() {
+    let node = NodeId::new(5).expect("a node-ID");
+    for (flipped, left) in [(1..2, None), (1..6, None), (1..99, Some((16, true)))] {
+        let mut bus = Flipping { bus: bus_of("mh4", 0), writes: 0, flipped: flipped.clone() };
+        let mut journal = KeptJournal::default();
+        let probed =
+            probe(&mut Master::new(&mut bus, Timing::default()), &Node::new(node), &mut journal).expect("a bus");
+        assert_eq!(probed.left.map(|left| (left.milliseconds, left.is_certain)), left, "{flipped:?}");
+        assert_eq!((probed.failure.is_some(), journal.0.len()), (left.is_some(), usize::from(left.is_some())));
+        assert_eq!(heartbeat_time(&mut bus.bus), left.map_or(0, |(left, _)| left), "{flipped:?}");
+    }
+    // The restore by the next run is read back, too.
+    let write = TemporaryWrite {
+        node,
+        identity: [None; 4],
+        object: ObjectId::new(0x1017, 0),
+        before: vec![0, 0],
+        written: vec![100, 0],
+    };
+    for (flipped, expected) in [(1..1, Undone::Restored), (0..1, Undone::NotRestored)] {
+        let mut bus = Flipping { bus: bus_of("mh4", 100), writes: 0, flipped };
+        assert_eq!(write.undo(&mut Master::new(&mut bus, Timing::default())).expect("a bus"), expected);
+    }
 }
 
 fn heartbeat_time(bus: &mut MemoryBus) -> u16 {

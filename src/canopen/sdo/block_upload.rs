@@ -176,6 +176,10 @@ impl BlockUpload {
         if multiplexer(data) != Some(self.object) {
             return Progress::NotOurs;
         }
+        // C6h with one changed bit is 46h: expedited without a size, although bits 2 and 3 are only for the size.
+        if head & 0xf3 == 0x42 && head & 0x0c != 0 {
+            return self.fail(Violation::Command, frame, out);
+        }
         if head & 0xe1 != 0xc0 {
             // A segmented or expedited answer, or a violation: `Upload` handles both.
             let progress = self.plain.on_frame(frame, out);

@@ -4,8 +4,8 @@ use crate::canopen::value::DataType;
 use crate::master::{Error as MasterError, Master, SdoError, SdoFailure};
 use crate::node::read::read_values;
 use crate::node::state::{HEARTBEAT_TIME, LifeWatch, Proof, StateReport};
-use crate::node::write::write;
-use crate::node::{Error, Node, Written};
+use crate::node::write::{verify, write};
+use crate::node::{Error, Node};
 use crate::tasks::Failure;
 use crate::tasks::journal::{Journal, TemporaryWrite};
 use crate::tasks::nmt::NmtFailure;
@@ -14,8 +14,8 @@ use std::time::Duration;
 /// The heartbeat time during the probe.
 const PROBE_PERIOD: Duration = Duration::from_millis(100);
 
-/// The number of further Ctrl-C that are ignored until 1017h is restored.
-const MAX_INTERRUPTS: u32 = 5;
+/// How often 1017h is restored again after Ctrl-C, or if the node has another value.
+const MAX_ATTEMPTS: u32 = 5;
 
 /// The result of a probe.
 #[derive(Debug)]
@@ -51,8 +51,8 @@ pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) ->
         Some(Ok(value)) => value.as_u64().and_then(|time| u16::try_from(time).ok()).unwrap_or(0),
         None => 0,
     };
-    let milliseconds = u16::try_from(PROBE_PERIOD.as_millis()).unwrap_or(u16::MAX);
-    let temporary = TemporaryWrite::to(node, HEARTBEAT_TIME, &before.to_le_bytes(), &milliseconds.to_le_bytes());
+    let probed = u16::try_from(PROBE_PERIOD.as_millis()).unwrap_or(u16::MAX);
+    let temporary = TemporaryWrite::to(node, HEARTBEAT_TIME, &before.to_le_bytes(), &probed.to_le_bytes());
     if let Err(error) = journal.record(&temporary) {
         return Ok(failed(Failure::at(node.id, NmtFailure::NotRecorded(error))));
     }
@@ -69,35 +69,47 @@ pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) ->
         }
         Err(_) => Ok(()),
     };
-    let restored = restore(master, node, before);
+    let (restored, is_acknowledged) = restore(master, node, before);
     if restored.is_ok() {
         journal.remove(&temporary);
     }
-    let is_certain = set.is_ok();
+    let milliseconds = match &restored {
+        Err(Error::NotKept { found, .. }) => found.as_u64().and_then(|time| u16::try_from(time).ok()),
+        _ => None,
+    };
+    let is_certain = milliseconds.is_some() || set.is_ok() && !is_acknowledged;
+    let left = LeftHeartbeat { milliseconds: milliseconds.unwrap_or(probed), before, is_certain };
     let failure = split(set)?;
     waited?;
     let (failure, left) = match split(restored)? {
         None => (failure, None),
-        Some(error) => (Some(error), Some(LeftHeartbeat { milliseconds, before, is_certain })),
+        Some(error) => (Some(error), Some(left)),
     };
     let report = watch.state(node.id).map_or(unknown, |state| StateReport::known(node.id, state, Proof::Heartbeat));
     Ok(Probe { report, failure, left })
 }
 
-/// Writes the old heartbeat time, even after Ctrl-C.
-fn restore(master: &mut Master<'_>, node: &Node, before: u16) -> Result<Written, Error> {
-    let mut result = write(master, node, HEARTBEAT_TIME, &before.to_le_bytes());
-    for _ in 0..MAX_INTERRUPTS {
-        if !matches!(result, Err(Error::Interrupted)) {
+/// Writes the old heartbeat time and reads it back, even after Ctrl-C. Also returns whether a write was acknowledged:
+/// a frame with a flipped bit is acknowledged, too.
+fn restore(master: &mut Master<'_>, node: &Node, before: u16) -> (Result<(), Error>, bool) {
+    let mut is_acknowledged = false;
+    let mut attempt = |master: &mut Master<'_>| {
+        write(master, node, HEARTBEAT_TIME, &before.to_le_bytes())?;
+        is_acknowledged = true;
+        verify(master, node, HEARTBEAT_TIME, &before.to_le_bytes(), DataType::Unsigned(2))
+    };
+    let mut result = attempt(master);
+    for _ in 0..MAX_ATTEMPTS {
+        if !matches!(result, Err(Error::Interrupted | Error::NotKept { .. })) {
             break;
         }
-        result = write(master, node, HEARTBEAT_TIME, &before.to_le_bytes());
+        result = attempt(master);
     }
-    result
+    (result, is_acknowledged)
 }
 
 /// The failure of the node itself; bus errors and Ctrl-C are errors.
-fn split(result: Result<Written, Error>) -> Result<Option<Failure>, MasterError> {
+fn split<T>(result: Result<T, Error>) -> Result<Option<Failure>, MasterError> {
     match result {
         Ok(_) => Ok(None),
         Err(Error::Bus(error)) => Err(MasterError::Bus(error)),
