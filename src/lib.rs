@@ -25,8 +25,8 @@
 //! - [`publish`] → bus (files, moments, interrupts). The form of recorded rows outside of the bench: line protocol.
 //! - [`output`] → tasks (reports), publish (reports), node, measure, device, canopen (values), bus (moments, faults).
 //!   All sentences, tables and file formats. Part of the feature `cli`.
-//! - [`cli`] → tasks, output, node, measure, master, sim, bus, device, canopen (values). Arguments and help texts, one
-//!   file for each command. Part of the feature `cli`.
+//! - [`cli`] → tasks, output, publish, node, measure, master, sim, bus, device, canopen (values). Arguments and help
+//!   texts, one file for each command. Part of the feature `cli`.
 //!
 //! # Read a sensor
 //!

@@ -14,7 +14,7 @@ use std::fs;
 const ARROWS: &[(&str, &[&str])] = &[
     ("bus", &["canopen"]),
     ("canopen", &[]),
-    ("cli", &["bus", "canopen", "device", "master", "measure", "node", "output", "sim", "tasks"]),
+    ("cli", &["bus", "canopen", "device", "master", "measure", "node", "output", "publish", "sim", "tasks"]),
     ("device", &["canopen"]),
     ("main", &["cli"]),
     ("master", &["bus", "canopen", "device"]),
@@ -76,21 +76,23 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("indicatif", &["output"]),
     ("noto_sans_mono_bitmap", &["output"]),
     ("libc", &["bus"]),
-    ("serde_json", &["output"]),
+    ("serde_json", &["output", "publish"]),
     ("signal_hook", &["bus"]),
     ("socket2", &["bus"]),
     ("socketcan", &["bus"]),
     ("terminal_size", &["output"]),
     ("std::env", &["cli", "main"]),
-    ("std::fs", &["bus", "cli", "output", "sim"]),
-    ("std::io", &["bus", "cli", "output", "sim"]),
-    ("std::net", &["bus"]),
+    ("std::fs", &["bus", "cli", "output", "publish", "sim"]),
+    ("std::io", &["bus", "cli", "output", "publish", "sim"]),
+    ("std::net", &["bus", "publish"]),
     ("std::os", &["bus"]),
     ("std::process", &["bus", "main"]),
-    // output: a slow disk must not keep the program from receiving.
-    ("std::thread", &["bus", "output"]),
+    // output: a slow disk must not keep the program from receiving. publish: a slow server must not delay Ctrl-C, nor
+    // other recordings.
+    ("std::thread", &["bus", "output", "publish"]),
     ("std::time::Instant", &["bus"]),
     ("toml", &["device", "sim"]),
+    ("ureq", &["publish"]),
 ];
 
 /// Functions that read a clock or sleep. Only `bus` may call them: all other layers get the time as an argument.

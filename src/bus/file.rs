@@ -98,9 +98,9 @@ pub fn is_same(one: &Metadata, other: &Metadata) -> bool {
     identity(one).is_some_and(|one| identity(other) == Some(one))
 }
 
-/// Device and inode.
+/// Device and inode; `None` if the system has none.
 #[cfg(unix)]
-fn identity(metadata: &Metadata) -> Option<(u64, u64)> {
+pub fn identity(metadata: &Metadata) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt;
     Some((metadata.dev(), metadata.ino()))
 }
@@ -110,8 +110,9 @@ fn links(metadata: &Metadata) -> u64 {
     std::os::unix::fs::MetadataExt::nlink(metadata)
 }
 
+/// Device and inode; `None` on this system.
 #[cfg(not(unix))]
-fn identity(_: &Metadata) -> Option<(u64, u64)> {
+pub fn identity(_: &Metadata) -> Option<(u64, u64)> {
     None
 }
 

@@ -1,7 +1,7 @@
 //! The two time lines of a bus: a monotonic one for waiting and measuring, and the wall clock for files.
 
 use std::ops::{Add, Sub};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 /// A moment on a bus's monotonic time line, counted from when the bus was opened.
 ///
@@ -92,6 +92,23 @@ pub struct Stamp {
     pub mono: Mono,
     /// The time for users and files.
     pub wall: Wall,
+}
+
+/// The two clocks of the host, for a program without a bus.
+#[derive(Clone, Copy, Debug)]
+pub struct HostClock(Instant);
+
+impl HostClock {
+    /// A clock whose monotonic time starts now.
+    #[expect(clippy::new_without_default, reason = "it reads a clock")]
+    pub fn new() -> HostClock {
+        HostClock(Instant::now())
+    }
+
+    /// The present moment.
+    pub fn now(&self) -> Stamp {
+        Stamp { mono: Mono::at(self.0.elapsed()), wall: Wall::now() }
+    }
 }
 
 /// The microseconds that the local time of the host is ahead of UTC, `at` microseconds after 1970; 0 if that is

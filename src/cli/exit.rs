@@ -25,6 +25,17 @@ pub(super) struct Several {
     pub(super) failures: Vec<Failure>,
 }
 
+/// Like [`Several`], for failures that do not come from a task.
+#[cfg(feature = "publish")]
+#[derive(Debug, thiserror::Error)]
+#[error("{} failures", .messages.len())]
+pub(super) struct Messages {
+    /// Decides the exit code.
+    pub(super) kind: Kind,
+    /// The messages in the order of printing.
+    pub(super) messages: Vec<ErrorMessage>,
+}
+
 /// The result of a command for several nodes: success if no node failed.
 ///
 /// # Errors
@@ -191,6 +202,8 @@ fn print(console: &Console, error: &anyhow::Error) -> u8 {
         console.fail(message, code(message.kind));
     }
     let decides = error.downcast_ref::<Several>().map(|several| several.kind);
+    #[cfg(feature = "publish")]
+    let decides = decides.or(error.downcast_ref::<Messages>().map(|messages| messages.kind));
     decides.or(messages.first().map(|message| message.kind)).map_or(0, code)
 }
 
@@ -201,6 +214,10 @@ fn messages(error: &anyhow::Error) -> Vec<ErrorMessage> {
     }
     if let Some(several) = error.downcast_ref::<Several>() {
         return several.failures.iter().map(ErrorMessage::from).collect();
+    }
+    #[cfg(feature = "publish")]
+    if let Some(several) = error.downcast_ref::<Messages>() {
+        return several.messages.clone();
     }
     vec![message(error)]
 }

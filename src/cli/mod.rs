@@ -32,6 +32,8 @@ mod own;
 pub mod parse;
 mod pdo;
 mod plot;
+#[cfg(feature = "publish")]
+mod publish;
 mod read;
 mod recording;
 mod scan;
@@ -227,15 +229,16 @@ pub(crate) enum When {
     Never,
 }
 
-/// Registers the commands: variant, type of the arguments, name, aliases. Each type has a
+/// Registers the commands: condition, variant, type of the arguments, name, aliases. Each type has a
 /// `claim` (the nodes that no other cangauge may use) and a `run`. Its doc comment is the help text.
 macro_rules! commands {
-    ($($variant:ident($arguments:ty): $name:literal $(| $alias:literal)*;)+) => {
+    ($($(#[$condition:meta])? $variant:ident($arguments:ty): $name:literal $(| $alias:literal)*;)+) => {
         // The doc comment of the type is the help of the command.
         #[allow(missing_docs)]
         #[derive(Debug, Subcommand)]
         pub(crate) enum Command {
             $(
+                $(#[$condition])?
                 #[command(name = $name)]
                 $(#[command(visible_alias = $alias)])*
                 $variant($arguments),
@@ -246,19 +249,20 @@ macro_rules! commands {
             /// The nodes that no other cangauge may use at the same time.
             fn claim(&self) -> Claim {
                 match self {
-                    $(Command::$variant(command) => command.claim(),)+
+                    $($(#[$condition])? Command::$variant(command) => command.claim(),)+
                 }
             }
 
             fn run(&self, global: &Global) -> anyhow::Result<()> {
                 match self {
-                    $(Command::$variant(command) => command.run(global),)+
+                    $($(#[$condition])? Command::$variant(command) => command.run(global),)+
                 }
             }
         }
 
         /// Names of a command, and the function that adds its arguments. One command can be built without the others.
-        const ARGUMENTS: &[(&[&str], Augment)] = &[$((&[$name $(, $alias)*], <$arguments>::augment_args)),+];
+        const ARGUMENTS: &[(&[&str], Augment)] =
+            &[$($(#[$condition])? (&[$name $(, $alias)*], <$arguments>::augment_args)),+];
     };
 }
 
@@ -291,6 +295,7 @@ commands! {
     Objects(objects::Objects): "objects";
     Export(export::Export): "export";
     Plot(plot::Plot): "plot";
+    #[cfg(feature = "publish")] Publish(publish::Publish): "publish";
     Devices(devices::Devices): "devices";
     Completions(completions::Completions): "completions";
 }

@@ -10,8 +10,8 @@ use crate::bus::time::ahead_of_utc;
 use crate::device::nearest::distance;
 use crate::output::plot::{self, TimeAxis};
 use crate::output::recording::{Recording, RecordingError, TimeBase};
-use crate::output::rows::Series;
 use crate::output::stdout_width;
+use crate::publish::series;
 use crate::tasks::Kind;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -218,7 +218,7 @@ fn parts(file: &Path) -> anyhow::Result<Vec<PathBuf>> {
         return Ok(vec![file.to_owned()]);
     }
     let parts: Vec<PathBuf> =
-        Series::existing(file).unwrap_or_default().into_iter().map(|number| Series::name(file, number)).collect();
+        series::existing(file).unwrap_or_default().into_iter().map(|number| series::name(file, number)).collect();
     // An absent file is an error when it is opened.
     Ok(if parts.is_empty() { vec![file.to_owned()] } else { parts })
 }

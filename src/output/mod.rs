@@ -34,6 +34,8 @@ pub mod objects;
 pub mod pdo;
 pub mod plot;
 pub mod progress;
+#[cfg(feature = "publish")]
+pub mod publish;
 pub mod read;
 pub mod recording;
 pub mod replay;

@@ -7,8 +7,8 @@ use super::rows::LONG_COLUMNS;
 use crate::bus::{Mono, Stamp};
 use crate::measure::interval::IntervalTracker;
 use crate::measure::sample::{Sample, Source, Status};
-use crate::publish::cells::{Cells, text, wide_column};
-use cells::{Clock, LongRow, WideRow, decimal, micros};
+use crate::publish::cells::{Cells, Clock, decimal, micros, text, wide_column};
+use cells::{LongRow, WideRow};
 use std::io::{self, BufRead};
 use std::time::Duration;
 

@@ -33,6 +33,8 @@ mod partly_failing_nodes;
 mod pdo;
 mod plot;
 mod profiles;
+#[cfg(feature = "publish")]
+mod publish;
 mod read;
 mod readme;
 mod replay;

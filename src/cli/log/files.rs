@@ -11,6 +11,7 @@ use crate::output::rows::{
     Dialect, ExistingLines, FileFormat, HeaderMismatch, Layout, LineWriter, OutputTarget, QUEUE_CAPACITY, Rotation,
     Rows, Series, Setup, TimeForm, existing_lines,
 };
+use crate::publish::series;
 use crate::tasks::Failure;
 use crate::tasks::log::LogFailure;
 use clap::{Args, ValueEnum};
@@ -313,24 +314,24 @@ impl Files {
 
     /// Opens the first file of a series.
     fn open_first(&self, base: &Path, opened: &mut OpenFiles) -> anyhow::Result<()> {
-        let numbers = Series::existing(base)
-            .map_err(|source| FileError { what: format!("create {}", Series::name(base, 1).display()), source })?;
+        let numbers = series::existing(base)
+            .map_err(|source| FileError { what: format!("create {}", series::name(base, 1).display()), source })?;
         let mut first = 1;
         let mut last_file = None;
         if let (Some(last), Existing::Overwrite) = (numbers.last(), self.existing()) {
-            let path = Series::name(base, *last);
+            let path = series::name(base, *last);
             File::open(&path).map_or(Ok(()), |file| lock_output(&file, &path))?;
         }
         match (numbers.last(), self.existing()) {
             (Some(_), Existing::Refuse) => {
-                let name = Series::name(base, *numbers.first().unwrap_or(&1));
+                let name = series::name(base, *numbers.first().unwrap_or(&1));
                 let failure = ErrorMessage::usage(format!("{} exists", name.display()));
                 return Err(failure
                     .hint("overwrite with --force, continue with --append, or choose another file")
                     .into());
             }
             (Some(last), Existing::Continue) => {
-                let path = Series::name(base, *last);
+                let path = series::name(base, *last);
                 let read = |path: &Path| -> io::Result<_> {
                     let mut file = OpenOptions::new().read(true).append(true).open(path)?;
                     let kept = existing_lines(&mut file)?;
@@ -346,7 +347,7 @@ impl Files {
             _ => {}
         }
         let existing = if self.force { Existing::Overwrite } else { Existing::Refuse };
-        opened.rows = Some(OutFile::open(&Series::name(base, first), existing, None)?);
+        opened.rows = Some(OutFile::open(&series::name(base, first), existing, None)?);
         opened.setup.has_series = true;
         let series = Series::new(base, first.saturating_add(1), self.force);
         opened.series = Some(match last_file {
@@ -391,9 +392,9 @@ impl OpenFiles {
     /// The files of the rows; `None` for stdout.
     pub(super) fn written(&self) -> Option<String> {
         let first = self.rows.as_ref()?.path().display();
-        let base = self.rotated.as_ref().map(|base| Series::existing(base).unwrap_or_default());
+        let base = self.rotated.as_ref().map(|base| series::existing(base).unwrap_or_default());
         let last = base.and_then(|numbers| numbers.last().copied()).zip(self.rotated.as_ref());
-        let last = last.map(|(number, base)| Series::name(base, number).display().to_string());
+        let last = last.map(|(number, base)| series::name(base, number).display().to_string());
         Some(match last.filter(|last| *last != first.to_string()) {
             Some(last) => format!("{first} and the following files up to {last}"),
             None => first.to_string(),

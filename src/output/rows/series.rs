@@ -1,8 +1,8 @@
 //! The files of one recording: `run-0001.csv`, `run-0002.csv` and so on.
 
 use crate::bus::file::lock;
-use std::ffi::OsString;
-use std::fs::{self, File, OpenOptions};
+use crate::publish::series::name;
+use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -33,38 +33,10 @@ impl Series {
         self.last.take().map_or(Ok(()), |(file, length)| file.set_len(length))
     }
 
-    /// The file with this number.
-    pub fn name(base: &Path, number: u32) -> PathBuf {
-        let mut name = base.file_stem().map_or_else(OsString::new, OsString::from);
-        name.push(format!("-{number:04}"));
-        if let Some(extension) = base.extension() {
-            name.push(".");
-            name.push(extension);
-        }
-        base.with_file_name(name)
-    }
-
-    /// The numbers of the existing files, in ascending order.
-    ///
-    /// # Errors
-    /// The folder cannot be read.
-    pub fn existing(base: &Path) -> io::Result<Vec<u32>> {
-        let folder = base.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut numbers = Vec::new();
-        for entry in fs::read_dir(folder)? {
-            let name = entry?.file_name();
-            let number = Path::new(&name).file_stem().and_then(|stem| stem.to_str()?.rsplit_once('-')?.1.parse().ok());
-            // `run-1.csv` and `run-+0001.csv` do not belong to the series.
-            numbers.extend(number.filter(|&number| Series::name(base, number).file_name() == Some(&name)));
-        }
-        numbers.sort_unstable();
-        Ok(numbers)
-    }
-
     /// Creates the next file and locks it. The number of a file that another program writes is skipped.
     pub(super) fn create(&mut self) -> io::Result<(PathBuf, File)> {
         loop {
-            let path = Series::name(&self.base, self.next);
+            let path = name(&self.base, self.next);
             self.next += 1;
             let mut options = OpenOptions::new();
             options.append(true).create(self.force).create_new(!self.force);
@@ -81,14 +53,8 @@ impl Series {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names() {
-        let name = |base: &str, number| Series::name(Path::new(base), number).display().to_string();
-        assert_eq!(name("run.csv", 1), "run-0001.csv");
-        assert_eq!(name("a.b/run.tar.gz", 12), "a.b/run.tar-0012.gz");
-        assert_eq!(name("a.b/run", 12345), "a.b/run-12345");
-    }
+    use crate::publish::series::existing;
+    use std::fs;
 
     #[test]
     fn existing_files_are_found_and_skipped() {
@@ -97,15 +63,15 @@ mod tests {
             fs::write(folder.path().join(name), name).expect("written");
         }
         let base = folder.path().join("run.csv");
-        assert_eq!(Series::existing(&base).expect("read"), [2, 10]);
+        assert_eq!(existing(&base).expect("read"), [2, 10]);
         let mut series = Series::new(&base, 1, false);
         let created: Vec<bool> = (0..2).map(|_| series.create().is_ok()).collect();
-        assert_eq!((created, Series::existing(&base).expect("read")), (vec![true, true], vec![1, 2, 3, 10]));
+        assert_eq!((created, existing(&base).expect("read")), (vec![true, true], vec![1, 2, 3, 10]));
         assert_eq!(fs::read_to_string(folder.path().join("run-0002.csv")).expect("read"), "run-0002.csv");
         let first = Series::new(&base, 2, true).create().expect("overwritten");
         assert_eq!(fs::read_to_string(folder.path().join("run-0002.csv")).expect("read"), "");
         // A file in use by a writer is not overwritten.
         let (second, _file) = Series::new(&base, 2, true).create().expect("overwritten");
-        assert_eq!((first.0, second), (Series::name(&base, 2), Series::name(&base, 3)));
+        assert_eq!((first.0, second), (name(&base, 2), name(&base, 3)));
     }
 }

@@ -4,6 +4,7 @@ use super::*;
 use crate::bus::{Mono, Wall};
 use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Raw, Status};
+use crate::publish::series;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -145,7 +146,7 @@ fn wide_rows_and_changed_columns() {
 fn rotated(rotation: Rotation, count: u64) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let base = folder.path().join("run.csv");
-    let file = fs::File::create(Series::name(&base, 1)).expect("created");
+    let file = fs::File::create(series::name(&base, 1)).expect("created");
     let writer = LineWriter::direct(
         OutputTarget::File { file, path: base.clone(), keep: 0 },
         Some(Series::new(&base, 2, false)),
@@ -156,8 +157,8 @@ fn rotated(rotation: Rotation, count: u64) -> Vec<String> {
         rows.put(None, &[row], &[source("ch1", "")]).expect("written");
     }
     rows.finish(&mut || false).expect("written");
-    let read = |number| fs::read_to_string(Series::name(Path::new(&base), number)).expect("a file");
-    Series::existing(&base).expect("the folder").into_iter().map(read).collect()
+    let read = |number| fs::read_to_string(series::name(Path::new(&base), number)).expect("a file");
+    series::existing(&base).expect("the folder").into_iter().map(read).collect()
 }
 
 /// The values in the files. Each file must start with the header.
@@ -175,7 +176,7 @@ fn rows_of_a_device_that_replaces_another_are_in_the_next_file() {
     for (has_series, expected) in [(true, vec![vec![0], vec![1]]), (false, vec![vec![0, 1]])] {
         let folder = tempfile::tempdir().expect("a folder");
         let base = folder.path().join("run.csv");
-        let file = fs::File::create(Series::name(&base, 1)).expect("created");
+        let file = fs::File::create(series::name(&base, 1)).expect("created");
         let target = OutputTarget::File { file, path: base.clone(), keep: 0 };
         let writer = LineWriter::direct(target, has_series.then(|| Series::new(&base, 2, false)));
         let mut rows = Rows::new(writer, Setup { has_series, ..Setup::default() });
@@ -189,8 +190,8 @@ fn rows_of_a_device_that_replaces_another_are_in_the_next_file() {
             }
         }
         rows.finish(&mut || false).expect("written");
-        let read = |number| fs::read_to_string(Series::name(&base, number)).expect("a file");
-        let files: Vec<String> = Series::existing(&base).expect("the folder").into_iter().map(read).collect();
+        let read = |number| fs::read_to_string(series::name(&base, number)).expect("a file");
+        let files: Vec<String> = series::existing(&base).expect("the folder").into_iter().map(read).collect();
         assert_eq!(values(&files), expected);
     }
 }

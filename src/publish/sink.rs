@@ -1,0 +1,148 @@
+//! What a publisher needs from a server: to encode rows, to send them, and to know the answer.
+
+use super::row::Row;
+use crate::bus::{Mono, Wall};
+use std::time::Duration;
+
+/// What the rows of a recording have in common.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// A number that differs for each origin of a publisher.
+    pub id: u64,
+    /// The identifier of the run; `None` if the recording has no file of the run.
+    pub run: Option<String>,
+    /// The bench.
+    pub bench: String,
+    /// The file, without its folder.
+    pub file: String,
+    /// The tags without `bench`, in alphabetical order.
+    pub tags: Vec<(String, String)>,
+    /// Further tags of each node: its serial number and its name.
+    pub identities: Vec<(u8, Vec<(String, String)>)>,
+}
+
+impl Origin {
+    /// The further tags of a node.
+    pub fn identity(&self, node: u8) -> &[(String, String)] {
+        let own = self.identities.iter().find(|(known, _)| *known == node);
+        own.map_or(&[], |(_, tags)| tags.as_slice())
+    }
+}
+
+/// A row with its place.
+#[derive(Clone, Copy, Debug)]
+pub struct Record<'a> {
+    /// The row.
+    pub row: &'a Row<'a>,
+    /// The number of its line, counted from 1.
+    pub line: u64,
+    /// What it has in common with other rows.
+    pub origin: &'a Origin,
+}
+
+/// A server.
+pub trait Sink: Send {
+    /// Appends the form in which a row is sent.
+    fn encode(&mut self, record: &Record<'_>, out: &mut Vec<u8>);
+
+    /// Sends encoded rows, and waits for the acknowledgement.
+    ///
+    /// # Errors
+    /// The server did not acknowledge all rows. It may have stored some of them.
+    fn send(&mut self, rows: &[u8], now: Wall) -> Result<(), SendError>;
+
+    /// Nothing is to be sent at present.
+    ///
+    /// # Errors
+    /// The connection was lost.
+    fn idle(&mut self, _now: Mono) -> Result<(), Trouble> {
+        Ok(())
+    }
+
+    /// The publisher ends.
+    fn close(&mut self) {}
+}
+
+/// Why rows are not acknowledged.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SendError {
+    /// The server rejects at least one row.
+    Rejected(Rejection),
+    /// The server does not accept as many bytes at once.
+    TooLarge,
+    /// The rows can be sent again, after this time if the server states it.
+    Trouble(Trouble, Option<Duration>),
+}
+
+impl From<Trouble> for SendError {
+    fn from(trouble: Trouble) -> SendError {
+        SendError::Trouble(trouble, None)
+    }
+}
+
+/// A rejection of rows.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Rejection {
+    /// The words of the server.
+    pub reason: String,
+    /// Whether the words are about the contents of rows. Otherwise, the server may reject everything.
+    pub is_about_rows: bool,
+    /// The number of rejected rows, if the server states it.
+    pub dropped: Option<u64>,
+}
+
+/// Why a server does not accept rows at present.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Trouble {
+    /// There is no connection: the words of the operating system.
+    NoConnection(String),
+    /// The server did not answer in time.
+    Timeout,
+    /// The server closed the connection before its answer.
+    Closed,
+    /// The answer is not in the protocol of the server.
+    Garbage,
+    /// The answer is not the acknowledgement of a database: its HTTP status.
+    NotDatabase(u16),
+    /// The server redirects to another address: its HTTP status. A redirection is not followed.
+    Redirect(u16),
+    /// The server rejects the credentials: its HTTP status or its MQTT return code.
+    Unauthorized(u16),
+    /// The server reports a failure: HTTP status and words.
+    Status(u16, String),
+    /// The server rejects every row, and accepted none so far: its words.
+    RejectsEverything(String),
+    /// The MQTT broker rejects the connection: its return code.
+    Refused(u8),
+    /// No secure connection is possible: the reason.
+    Tls(String),
+}
+
+impl Trouble {
+    /// The word in the position file.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Trouble::NoConnection(_) => "no-connection",
+            Trouble::Timeout => "timeout",
+            Trouble::Closed => "closed",
+            Trouble::Garbage => "garbage",
+            Trouble::NotDatabase(_) => "not-a-database",
+            Trouble::Redirect(_) => "redirect",
+            Trouble::Unauthorized(_) => "unauthorized",
+            Trouble::Status(..) => "server-error",
+            Trouble::RejectsEverything(_) => "rejects-everything",
+            Trouble::Refused(_) => "refused",
+            Trouble::Tls(_) => "tls",
+        }
+    }
+
+    /// Whether another attempt is pointless without a change of the command or of the server.
+    pub fn is_lasting(&self) -> bool {
+        match self {
+            Trouble::NoConnection(_) | Trouble::Timeout | Trouble::Closed | Trouble::Garbage => false,
+            Trouble::Status(code, _) => !matches!(code, 408 | 425 | 429 | 500..),
+            Trouble::Refused(code) => *code != 3,
+            _ => true,
+        }
+    }
+}
