@@ -10,7 +10,8 @@ use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::catalog;
-use crate::device::config_file::{Document, Item};
+use crate::device::config_file::{Document, Item, Place};
+use crate::device::eds::Warning;
 use crate::node::Node;
 use crate::node::offline::offline;
 use crate::output::config::{SCHEMA, write_toml};
@@ -113,7 +114,15 @@ fn file(name: &str, global: &Global) -> anyhow::Result<tasks::config::File> {
     if extension.is_none_or(|extension| extension != "dcf" && extension != "eds") {
         return Ok(tasks::config::File::Settings(document(name)?));
     }
-    let dcf = descriptions::eds(name, global)?;
+    let mut dcf = descriptions::eds(name, global)?;
+    if !dcf.unread_values.is_empty() {
+        let mistake = |warning: Warning| {
+            let place = Place { line: warning.line, column: 1 };
+            Mistake { place, key: String::new(), problem: Problem::Syntax { message: warning.text } }
+        };
+        return Err(mistakes(name, dcf.unread_values.drain(..).map(mistake).collect()));
+    }
+    descriptions::warn_about_values(name, &dcf, global);
     if dcf.parameter_values.is_empty() {
         let message = format!("{name}: it has no ParameterValue: it describes a device and sets nothing");
         return Err(ErrorMessage::usage(message).into());

@@ -269,6 +269,15 @@ fn print_warnings(file: &str, warnings: &[eds::Warning], global: &Global) {
     }
 }
 
+/// Prints the warnings of a DCF about its parameter values; with `-v` they were printed before.
+pub(super) fn warn_about_values(file: &str, dcf: &eds::Eds, global: &Global) {
+    let lines: BTreeSet<usize> = dcf.value_lines.values().copied().collect();
+    // The second of two values is in another line than the value that is used.
+    let is_about = |warning: &&eds::Warning| lines.contains(&warning.line) || warning.text.contains("ParameterValue");
+    let about = dcf.warnings.iter().filter(|_| global.verbose == 0 && dcf.warnings.len() > 1).filter(is_about);
+    about.for_each(|warning| global.console().warn(&format!("{file}:{}: {}", warning.line, warning.text)));
+}
+
 /// Prints the warnings of an EDS about one object; with `-v` they were printed before.
 pub(super) fn warn_about(global: &Global, model: Option<&Arc<Model>>, index: u16) {
     let Some(model) = model.filter(|model| global.verbose == 0 && model.warnings.len() > 1) else { return };

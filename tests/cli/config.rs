@@ -497,6 +497,35 @@ fn objects_of_a_dcf_that_the_device_lacks_are_reported() {
     );
 }
 
+/// A value that cannot be read must not be left out silently: the other values would be applied without it.
+#[test]
+fn unreadable_value_of_a_dcf_is_an_error_with_its_line() {
+    let bench = Bench::of("mh4@1");
+    let object = |index: &str, data_type: u8, value: &str| {
+        format!(
+            "[{index}]\nParameterName=P{index}\nObjectType=7\nDataType={data_type}\nAccessType=rw\nParameterValue={value}\n"
+        )
+    };
+    for (value, reason) in [
+        ("100ms", "[1017] ParameterValue: \"100ms\" is not a value of type u16"),
+        ("70000", "[1017] ParameterValue: \"70000\" does not fit u16 (0 to 65535)"),
+    ] {
+        let dcf = object("1015", 6, "5") + &object("1017", 6, value);
+        std::fs::write(bench.path("x.dcf"), dcf).expect("a file");
+        for line in ["config diff 1 x.dcf", "config apply 1 x.dcf", "config apply 1 x.dcf --dry-run"] {
+            let done = bench.run(line).exit(2);
+            assert!(done.stderr.contains(&format!("cangauge: x.dcf:12:1: {reason}\n")), "{line}: {}", done.stderr);
+        }
+    }
+    std::fs::write(bench.path("x.dcf"), object("1017", 99, "5")).expect("a file");
+    let done = bench.run("config diff 1 x.dcf").exit(2);
+    assert!(done.stderr.contains("x.dcf:6:1: [1017] ParameterValue: the data type is unknown\n"), "{}", done.stderr);
+    // Doubts about values are shown, not only counted.
+    std::fs::write(bench.path("x.dcf"), object("1017", 6, "0100")).expect("a file");
+    let done = bench.run("config diff 1 x.dcf").exit(1);
+    assert!(done.stderr.contains("x.dcf:6: [1017] ParameterValue: \"0100\" begins with 0"), "{}", done.stderr);
+}
+
 #[test]
 fn a_dcf_of_another_tool_has_formulas_units_and_an_address() {
     let bench = Bench::of("dps@127");

@@ -1,11 +1,11 @@
 //! The contents of one section: type, access, default, limits, flags.
 
-use super::ini::Section;
+use super::ini::{Item, Section};
 use super::names::Described;
 use super::objects::Reader;
 use super::text::quoted;
 use super::value::Reading;
-use super::{ObjectFlags, value};
+use super::{ObjectFlags, Warning, value};
 use crate::canopen::id::NodeId;
 use crate::canopen::value::DataType;
 use crate::device::description::Access;
@@ -76,6 +76,9 @@ impl Reader<'_> {
         let low = if has_limits { scalar("LowLimit") } else { None };
         let high = if has_limits { scalar("HighLimit") } else { None };
         let access = self.access(section);
+        if let (None, Some(item), true) = (&parameter_value, section.get("parametervalue"), access.is_writable()) {
+            self.unread(&format!("[{}] ParameterValue", section.shown), item, data_type, is_typed);
+        }
         let [low, high] = self.limits(section, data_type, access, [low, high]);
         let flags = number(section, "objflags").unwrap_or_default();
         Content {
@@ -110,6 +113,16 @@ impl Reader<'_> {
         };
         self.warn(section.line, format!("[{}] {what}; ignored", section.shown));
         [None, None]
+    }
+
+    /// Keeps a parameter value that cannot be read, with the reason.
+    pub(super) fn unread(&mut self, place: &str, item: &Item, data_type: DataType, is_typed: bool) {
+        let reason = match value::scalar(&item.value, data_type) {
+            _ if !is_typed => "the data type is unknown".to_owned(),
+            Err(error) => error,
+            Ok(_) => return,
+        };
+        self.objects.unread_values.push(Warning::new(item.line, format!("{place}: {reason}")));
     }
 
     pub(super) fn scalar(&mut self, place: &str, line: usize, text: &str, data_type: DataType) -> Option<Scalar> {

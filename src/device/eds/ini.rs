@@ -151,10 +151,16 @@ fn is_prose(section: &str) -> bool {
     matches!(section, "fileinfo" | "comments")
 }
 
-/// The value without a comment after it, if it has one.
+/// The value without a comment after it, if it has one. Inside a word, `#` is no comment: `16#180`, `1.#QNAN`.
 pub(super) fn without_comment(value: &str) -> Option<&str> {
-    let end = [";", "#", "//"].iter().filter_map(|mark| value.find(mark)).min()?;
+    let hash = value.char_indices().filter(|&(at, mark)| mark == '#' && !value[..at].ends_with(is_part_of_word));
+    let hash = hash.map(|(at, _)| at).next();
+    let end = [";", "//"].iter().filter_map(|mark| value.find(mark)).chain(hash).min()?;
     Some(value[..end].trim_end())
+}
+
+fn is_part_of_word(character: char) -> bool {
+    character.is_alphanumeric() || character == '.'
 }
 
 #[cfg(test)]
@@ -225,6 +231,10 @@ mod tests {
         assert_eq!(without_comment("0x7 ; VAR"), Some("0x7"));
         assert_eq!(without_comment("5 // five # 5"), Some("5"));
         assert_eq!(without_comment("; nothing"), Some(""));
-        assert_eq!(without_comment("P1"), None);
+        assert_eq!(without_comment("10 # ten"), Some("10"));
+        assert_eq!(without_comment("# ten"), Some(""));
+        for word in ["P1", "16#180", "1.#QNAN"] {
+            assert_eq!(without_comment(word), None, "{word}");
+        }
     }
 }

@@ -38,6 +38,8 @@ pub struct Eds {
     pub parameter_values: BTreeMap<ObjectId, Scalar>,
     /// The line of each of these values.
     pub value_lines: BTreeMap<ObjectId, usize>,
+    /// Values of writable objects that cannot be read, with the reasons. They are missing in `parameter_values`.
+    pub unread_values: Vec<Warning>,
     /// Objects that tools must skip when they read or write the whole dictionary.
     pub flags: BTreeMap<ObjectId, ObjectFlags>,
     /// The objects whose data type is missing or unknown. Their entries have the type DOMAIN and are read as bytes. For
@@ -164,6 +166,7 @@ pub fn read(bytes: &[u8]) -> Result<Eds, EdsError> {
         commissioning,
         parameter_values: objects.parameter_values,
         value_lines: objects.value_lines,
+        unread_values: objects.unread_values,
         flags: objects.flags,
         untyped: objects.untyped,
         warnings,

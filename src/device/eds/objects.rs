@@ -22,6 +22,8 @@ pub(super) struct Objects {
     pub(super) parameter_values: BTreeMap<ObjectId, Scalar>,
     /// The lines of these values.
     pub(super) value_lines: BTreeMap<ObjectId, usize>,
+    /// `ParameterValue` and `[…Value]` of writable objects that cannot be read.
+    pub(super) unread_values: Vec<Warning>,
     /// `ObjFlags`.
     pub(super) flags: BTreeMap<ObjectId, ObjectFlags>,
     /// The entries whose data type is unknown.
@@ -68,7 +70,7 @@ pub(super) fn read(ini: &Ini, warnings: &mut Vec<Warning>) -> Objects {
 pub(super) struct Reader<'a> {
     pub(super) ini: &'a Ini,
     warnings: &'a mut Vec<Warning>,
-    objects: Objects,
+    pub(super) objects: Objects,
     room: usize,
 }
 
@@ -262,15 +264,22 @@ impl Reader<'_> {
                 described.denotation = Some(item.value.clone());
             }
             if let Some(item) = values.remove(&object.sub) {
-                found.push((object, described.entry.data_type, item));
+                found.push((object, described.entry.data_type, described.entry.access.is_writable(), item));
             }
         }
-        for (object, data_type, item) in found {
+        for (object, data_type, is_writable, item) in found {
             let place = format!("[{:04X}Value] {}", object.index, object.sub);
             if let Some(value) = self.scalar(&place, item.line, &item.value, data_type) {
                 self.objects.parameter_values.insert(object, value);
                 self.objects.value_lines.insert(object, item.line);
+            } else if is_writable {
+                self.unread(&place, item, data_type, true);
             }
+        }
+        for (sub, item) in &values {
+            let text =
+                format!("[{}] {sub}: there is no such sub-index", parts.values.map_or("", |it| it.shown.as_str()));
+            self.objects.unread_values.push(Warning::new(item.line, text));
         }
         let lists = [(parts.values, values), (parts.denotations, denotations)];
         for (section, (sub, item)) in

@@ -36,7 +36,7 @@ pub(super) fn type_code(text: &str) -> Option<Reading<i128>> {
     integer(text).or_else(|| tolerant(text, hex))
 }
 
-/// An integer: decimal, `0x…`, or octal with a leading zero. A comment after it is ignored.
+/// An integer: decimal, `0x…`, `…h`, or octal with a leading zero. A comment after it is ignored.
 pub(super) fn integer(text: &str) -> Option<Reading<i128>> {
     tolerant(text, plain_integer)
 }
@@ -53,6 +53,9 @@ fn plain_integer(text: &str) -> Option<Reading<i128>> {
     };
     if let Some(hex) = hexadecimal(digits) {
         return radix(hex, 16).map(Reading::sure);
+    }
+    if let Some(value) = with_h(digits).and_then(|hex| radix(hex, 16)) {
+        return Some(Reading { value, doubt: Some(format!("{} is read as 0x{value:04X}", quoted(text))) });
     }
     let decimal = radix(digits, 10)?;
     if !digits.starts_with('0') {
@@ -73,6 +76,11 @@ fn plain_integer(text: &str) -> Option<Reading<i128>> {
 
 fn hexadecimal(text: &str) -> Option<&str> {
     text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"))
+}
+
+/// The digits of `180h`, which CiA 306 does not allow.
+fn with_h(text: &str) -> Option<&str> {
+    text.strip_suffix(['h', 'H'])
 }
 
 /// A switch: `0`, `1`, or a word.
@@ -146,7 +154,7 @@ fn number(text: &str, signed: Option<u8>) -> Option<Reading<Scalar>> {
     }
     if let Some(Reading { value, doubt }) = plain_integer(text) {
         let value = match signed {
-            Some(bytes) if hexadecimal(text).is_some() => from_bit_pattern(value, bytes),
+            Some(bytes) if hexadecimal(text).or_else(|| with_h(text)).is_some() => from_bit_pattern(value, bytes),
             _ => value,
         };
         return Some(Reading { value: integer_scalar(value), doubt });
@@ -247,9 +255,24 @@ mod tests {
         for (text, expected) in [("0x7 ; VAR", 7), ("5//five", 5), ("10 # ten", 10), ("0x0005;UNSIGNED8", 5)] {
             assert_eq!(integer(text), Some(Reading::sure(expected)), "{text}");
         }
-        for wrong in
-            ["", "-", "0x", "0x-1", "x", "1.0", "1 2", "١", "0x1_0", "99999999999999999999999999999999999999999"]
-        {
+        assert_eq!(integer("180h").map(|it| (it.value, it.doubt.is_some())), Some((0x180, true)));
+        assert_eq!(value("$NODEID+180h", U32), Some((Scalar::NodeIdPlus(0x180), true)));
+        assert_eq!(value("FFFFh", I16), Some((Scalar::Integer(-1), true)));
+        for wrong in [
+            "",
+            "-",
+            "0x",
+            "h",
+            "0x180h",
+            "16#180",
+            "0x-1",
+            "x",
+            "1.0",
+            "1 2",
+            "١",
+            "0x1_0",
+            "99999999999999999999999999999999999999999",
+        ] {
             assert_eq!(integer(wrong), None, "{wrong}");
         }
     }
