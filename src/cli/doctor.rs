@@ -1,6 +1,6 @@
 //! `cangauge doctor`.
 
-use super::args::Nodes;
+use super::args::{BusSpec, Nodes};
 use super::exit;
 use super::scan::SCAN_TIMEOUT;
 use super::{Global, descriptions, open};
@@ -40,6 +40,11 @@ impl Doctor {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        if matches!(global.bus, Some(BusSpec::Replay(_))) {
+            return Err(ErrorMessage::usage("doctor examines nodes on a live bus, not in a recording (replay:)")
+                .hint("to see what a recording contains: monitor, health, or log")
+                .into());
+        }
         let node = match &self.node {
             Some(Nodes::These(nodes)) if nodes.len() > 1 => {
                 return Err(ErrorMessage::usage("doctor examines one node, or all").hint("cangauge doctor").into());

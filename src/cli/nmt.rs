@@ -247,6 +247,8 @@ impl WatchArgs {
                     ControlFlow::Break(())
                 }
             };
+            // A recording answers no request.
+            let ask = ask && master.bus().is_live();
             Ok(watch(master, &nodes, ask, until, &mut on_change).or_fail()?)
         })?;
         failed.map_or(Ok(()), |error| Err(stdout(error)))

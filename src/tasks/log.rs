@@ -48,7 +48,7 @@ use std::time::Duration;
 /// The options of a recording.
 #[derive(Clone, Debug)]
 pub struct LogOptions {
-    /// The nodes.
+    /// The nodes. Each must send values, except in a passive recording of all node-IDs.
     pub nodes: Vec<NodeId>,
     /// The signals; empty for all.
     pub wanted: Vec<Wanted>,
@@ -122,6 +122,8 @@ pub enum LogEvent {
     EmergencyRepeated(NodeId, Emergency, String, u64),
     /// The controller reports a fault.
     Fault(Fault),
+    /// The controller reported this fault again, this many times.
+    FaultRepeated(Fault, u64),
     /// The receive buffer of the kernel.
     Buffer(ReceiveBuffer),
     /// The kernel dropped this many frames.
@@ -185,7 +187,8 @@ pub struct RecordingReport {
     pub length: Duration,
     /// The statistics of each source.
     pub statistics: Vec<(Source, Statistics)>,
-    /// Nodes whose setup could not be read. They were not recorded.
+    /// Nodes whose setup could not be read, and which were not recorded. For a passive recording: requested signals that
+    /// were not recorded.
     pub failed: Vec<Failure>,
     /// Nodes with a TPDO that two devices send. From then on, these TPDOs were ignored.
     pub two_devices: Vec<Failure>,

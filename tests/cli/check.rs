@@ -386,7 +386,7 @@ fn a_replayed_recording_is_checked_completely() {
         "{}",
         done.stdout
     );
-    replay(&["5", "humidity < 2"]).exit(3);
+    replay(&["5", "humidity < 2"]).exit(2);
     replay(&["5", "pressure < 2 degC"]).exit(2);
     replay(&["5", "pressure < 2", "--for", "1s", "--poll", "10ms"])
         .refuses("a recording (replay:) is receive-only: --sync, --poll and --request send");

@@ -65,6 +65,9 @@ pub fn event_text(event: &LogEvent) -> EventText {
             of_node(*node, "emcy", Warning, format!("node {node}: {text}: {}", times_more(*count)))
         }
         LogEvent::Fault(fault) => of_all("fault", fault_severity(*fault), fault.to_string()),
+        LogEvent::FaultRepeated(fault, count) => {
+            of_all("fault", fault_severity(*fault), format!("{fault}: {}", times_more(*count)))
+        }
         LogEvent::Buffer(buffer) => EventText { event: None, node: None, text: buffer_text(*buffer), severity: Detail },
         LogEvent::Dropped(count) => of_all("dropped", Warning, format!("the kernel dropped {count} frames")),
         LogEvent::Link(true) => of_all("link-up", Info, "the interface is up again".to_owned()),

@@ -29,6 +29,7 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
             Words::new(words)
                 .hint("read it by SDO: --poll 100ms (without --sync); or put it into a TPDO: cangauge pdo map --help")
         }
+        LogFailure::NotOverheard { name, known } => not_overheard(name, known),
         LogFailure::DifferentSyncIds(ids) => {
             let ids: Vec<String> = ids.iter().map(|(node, id)| format!("node {node}: {id}")).collect();
             Words::new(format!("the nodes have different COB-IDs of SYNC (1005h): {}", ids.join(", ")))
@@ -91,6 +92,11 @@ fn no_rtr(number: TpdoNumber) -> Words {
     let index = number.communication(1).index;
     Words::new(format!("{number} does not answer remote requests (bit 30 of {index:04X}h:1): nothing was started"))
         .hint("read by SDO instead: --poll 100ms")
+}
+
+fn not_overheard(name: &str, known: &[String]) -> Words {
+    let words = Words::new(format!("none of the known TPDO mappings contains {name}"));
+    if known.is_empty() { words } else { words.hint(format!("they contain: {}", known.join(", "))) }
 }
 
 fn nodes_lost(nodes: &[NodeId]) -> String {

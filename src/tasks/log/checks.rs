@@ -6,10 +6,11 @@ use crate::canopen::nmt::booted;
 use crate::canopen::pdo::Transmission;
 use crate::master::{Happening, Master};
 use crate::measure::decode::Wanted;
-use crate::measure::layout::Tpdo;
+use crate::measure::layout::{Signal, Tpdo};
 use crate::node::Node;
 use crate::node::wait::{Policy, wait};
 use crate::tasks::Failure;
+use crate::tasks::failure::Cause;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -46,6 +47,27 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
         }
     }
     Ok(())
+}
+
+/// Checks that the TPDOs of the nodes of a passive recording contain every requested signal. Without a description of a
+/// node, the recording does not show which further signals the node has.
+pub(super) fn check_overheard(nodes: &[Node], options: &LogOptions) -> Result<(), Failure> {
+    check_wanted(nodes, options).map_err(|failure| {
+        let name = match &failure.cause {
+            Cause::Log(LogFailure::UnknownSignal { name, .. }) if nodes.iter().any(|node| node.model.is_none()) => name,
+            Cause::Log(LogFailure::NotMapped { name, disabled: None }) => name,
+            _ => return failure,
+        };
+        let mut known: Vec<String> = Vec::new();
+        for node in nodes {
+            let mapped = |signal: &&Signal| {
+                node.tpdos.iter().any(|tpdo| tpdo.mapping.iter().any(|entry| signal.is_value(entry.object)))
+            };
+            known.extend(node.signals.iter().filter(mapped).map(|signal| signal.name.clone()));
+        }
+        known.dedup();
+        Failure::general(LogFailure::NotOverheard { name: name.clone(), known })
+    })
 }
 
 /// Whether a signal or object is mapped to a TPDO.

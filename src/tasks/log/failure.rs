@@ -29,6 +29,13 @@ pub enum LogFailure {
         /// A disabled TPDO that contains it.
         disabled: Option<(NodeId, TpdoNumber)>,
     },
+    /// A passive recording knows no TPDO mapping with this signal or object.
+    NotOverheard {
+        /// The signal or object.
+        name: String,
+        /// The signals in the known mappings.
+        known: Vec<String>,
+    },
     /// The nodes have different COB-IDs of SYNC (1005h).
     DifferentSyncIds(Vec<(NodeId, CanId)>),
     /// The nodes have different overflow values of the SYNC counter (1019h); 0 if the node expects no counter.
@@ -132,6 +139,7 @@ impl LogFailure {
                 Kind::CheckFailed
             }
             LogFailure::NothingReceived { .. }
+            | LogFailure::NotOverheard { .. }
             | LogFailure::OtherLength { .. }
             | LogFailure::NoMeasurements { .. }
             | LogFailure::NodesLost { all: true, .. } => Kind::NoAnswer,

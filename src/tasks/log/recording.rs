@@ -4,6 +4,7 @@ mod due;
 mod emergencies;
 mod incidents;
 mod liveness;
+mod repetitions;
 mod report;
 mod run;
 mod tally;
@@ -14,7 +15,7 @@ use super::rereads::Rereads;
 use super::silence::Questions;
 use super::states::NmtStates;
 use super::{LogEvent, LogFailure, LogOptions, Mode, Observer, Remark};
-use crate::bus::{Bus, Filters, Mono, ReceiveBuffer, Received, TimestampSource};
+use crate::bus::{Bus, Fault, Filters, Mono, ReceiveBuffer, Received, TimestampSource};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::Transmission;
@@ -29,6 +30,7 @@ use crate::tasks::synced::SyncedTpdos;
 use due::DueTpdos;
 use emergencies::Emergencies;
 use liveness::Liveness;
+use repetitions::Repetitions;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -51,6 +53,8 @@ pub(super) struct Recording<'o> {
     tally: Tally,
     liveness: Liveness,
     emergencies: Emergencies,
+    /// The faults that were reported a short time ago.
+    faults: Repetitions<Fault>,
     due: DueTpdos,
     synced: SyncedTpdos,
     /// Nodes whose node-ID or COB-ID two devices have. Their TPDOs are ignored.
@@ -94,8 +98,10 @@ pub(super) struct Recording<'o> {
 
 impl<'o> Recording<'o> {
     pub(super) fn new(nodes: Vec<Node>, options: &'o LogOptions, bus: &dyn Bus) -> Recording<'o> {
-        // A passive recording does not know its nodes yet, and expects no particular node.
-        let expected: Vec<NodeId> = nodes.iter().map(|node| node.id).collect();
+        // A passive recording does not know its nodes yet. It expects those that the user named.
+        let is_passive = options.mode == Mode::Passive && options.nodes.len() < NodeId::all().count();
+        let named = options.nodes.iter().copied().filter(|_| is_passive);
+        let expected: Vec<NodeId> = nodes.iter().map(|node| node.id).chain(named).collect();
         let mut emergencies = Emergencies::default();
         nodes.iter().for_each(|node| emergencies.watch(node));
         Recording {
@@ -108,6 +114,7 @@ impl<'o> Recording<'o> {
             tally: Tally::new(),
             liveness: Liveness::new(expected.into_iter()),
             emergencies,
+            faults: Repetitions::default(),
             due: DueTpdos::default(),
             synced: SyncedTpdos::new(matches!(options.mode, Mode::Sync(_)), matches!(options.mode, Mode::Request(_))),
             two_devices: BTreeMap::new(),
@@ -215,15 +222,18 @@ impl<'o> Recording<'o> {
 
     /// Expects no samples from nodes without any of the requested signals. At least one node has such signals.
     pub(super) fn ignore_nodes_without_signals(&mut self) {
-        if self.options.wanted.is_empty() {
-            return;
-        }
+        let nodes = self.liveness.nodes().collect();
+        self.ignore_without_signals(nodes);
+    }
+
+    /// Expects no samples from those of `nodes` that have none of the requested signals, if another node has one.
+    fn ignore_without_signals(&mut self, nodes: Vec<NodeId>) {
         let sources = self.decoder.sources();
-        let (with, without): (Vec<NodeId>, Vec<NodeId>) =
-            self.liveness.nodes().partition(|node| sources.iter().any(|source| source.node == *node));
-        if with.is_empty() {
+        if self.options.wanted.is_empty() || sources.is_empty() {
             return;
         }
+        let has_none = |node: &NodeId| sources.iter().all(|source| source.node != *node);
+        let without: Vec<NodeId> = nodes.into_iter().filter(has_none).collect();
         for node in without {
             self.liveness.remove(node);
             self.remarks.push(Remark::NoRequestedSignal(node));

@@ -1,5 +1,6 @@
 //! Finds the nodes and signals of a recording that sent no values, and the reasons.
 
+use super::checks::check_overheard;
 use super::recording::Recording;
 use super::{FIRST_SAMPLE_TIMEOUT, LogFailure, LogOptions, Mode};
 use crate::canopen::id::{CanId, NodeId};
@@ -45,6 +46,9 @@ pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Fa
     }
     if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.values().min()) {
         return Failure::at(node, LogFailure::UnknownMapping);
+    }
+    if let Err(failure) = check_overheard(&recording.overheard_nodes(), options) {
+        return failure;
     }
     if recording.nodes.is_empty() {
         let lengths = |&node: &NodeId| Some((node, recording.decoder.wrong_length(node)?));

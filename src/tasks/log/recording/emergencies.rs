@@ -1,5 +1,6 @@
 //! The emergency messages of the recorded nodes.
 
+use super::repetitions::Repetitions;
 use crate::bus::Mono;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::frame::Frame;
@@ -10,7 +11,6 @@ use crate::device::quirk::Quirk;
 use crate::node::Node;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
 
 /// Recognises emergency messages.
 #[derive(Debug, Default)]
@@ -20,18 +20,8 @@ pub(super) struct Emergencies {
     models: BTreeMap<NodeId, Arc<Model>>,
     /// The last emergency of each node that repeats it while it is pending ([`Quirk::EmergencyRepeats`]).
     repeating: BTreeMap<NodeId, Option<Emergency>>,
-    /// Emergencies with their code and register that were reported less than [`REPEAT_INTERVAL`] ago.
-    recent: Vec<Recent>,
-}
-
-/// An emergency that was reported.
-#[derive(Debug)]
-struct Recent {
-    node: NodeId,
-    emergency: Emergency,
-    reported: Mono,
-    /// The number of identical emergencies since then.
-    count: u64,
+    /// The emergencies that were reported a short time ago.
+    recent: Repetitions<(NodeId, Emergency)>,
 }
 
 /// A change of the overload of a node.
@@ -42,9 +32,6 @@ pub(super) enum OverloadChange {
     /// The overload ends.
     Ends,
 }
-
-/// Identical emergencies are reported once, and then as a count per this interval.
-const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Emergencies {
     /// Replaces the COB-ID (1014h) and the description of a node.
@@ -83,25 +70,17 @@ impl Emergencies {
 
     /// Handles an emergency. Returns whether to report it now; if not, it is counted.
     pub(super) fn is_new(&mut self, node: NodeId, emergency: Emergency, now: Mono) -> bool {
-        let mut recent = self.recent.iter_mut();
         // The manufacturer bytes may be a counter.
-        let is_same = |of: &Emergency| of.code == emergency.code && of.register == emergency.register;
-        if let Some(recent) = recent.find(|recent| recent.node == node && is_same(&recent.emergency)) {
-            recent.count += 1;
-            return false;
-        }
-        self.recent.push(Recent { node, emergency, reported: now, count: 0 });
-        true
+        let is_same = |&(of, other): &(NodeId, Emergency)| {
+            of == node && other.code == emergency.code && other.register == emergency.register
+        };
+        self.recent.is_new((node, emergency), is_same, now)
     }
 
     /// An emergency that was repeated, and how often since it was last reported. `at_end` does not wait for the
     /// interval.
     pub(super) fn next_repeated(&mut self, now: Mono, at_end: bool) -> Option<(NodeId, Emergency, u64)> {
-        let is_over = |recent: &Recent| at_end || now.since(recent.reported) >= REPEAT_INTERVAL;
-        self.recent.retain(|recent| recent.count > 0 || !is_over(recent));
-        let recent = self.recent.iter_mut().find(|recent| is_over(recent))?;
-        recent.reported = now;
-        Some((recent.node, recent.emergency, std::mem::take(&mut recent.count)))
+        self.recent.next(now, at_end).map(|((node, emergency), count)| (node, emergency, count))
     }
 
     /// The meaning of an emergency code on this node, and the set bits of its error register. The bits are omitted if
@@ -127,6 +106,7 @@ impl Emergencies {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     #[test]
     fn overload_of_a_device_without_status_lasts_until_the_error_is_over() {

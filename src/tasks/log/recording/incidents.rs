@@ -147,8 +147,11 @@ impl Recording<'_> {
         }
     }
 
-    /// Reports how often emergencies were repeated.
+    /// Reports how often emergencies and faults were repeated.
     pub(super) fn report_repeated(&mut self, at: Stamp, at_end: bool, observer: &mut dyn Observer) {
+        while let Some((fault, count)) = self.faults.next(at.mono, at_end) {
+            observer.event(&LogEvent::FaultRepeated(fault, count), at);
+        }
         while let Some((node, emergency, count)) = self.emergencies.next_repeated(at.mono, at_end) {
             let meaning = self.emergencies.meaning(node, emergency);
             observer.event(&LogEvent::EmergencyRepeated(node, emergency, meaning, count), at);
@@ -410,7 +413,9 @@ impl Recording<'_> {
 
     /// The controller reports a fault.
     pub(super) fn fault(&mut self, fault: Fault, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
-        observer.event(&LogEvent::Fault(fault), at);
+        if self.faults.is_new(fault, |&other| other == fault, at.mono) {
+            observer.event(&LogEvent::Fault(fault), at);
+        }
         match fault {
             Fault::BusOff => self.tally.events.bus_offs += 1,
             Fault::Restarted => self.reception_resumed(at.mono, master),

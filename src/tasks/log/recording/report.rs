@@ -3,22 +3,27 @@
 use super::Recording;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
+use crate::node::Node;
 use crate::node::state::Proof;
 use crate::tasks::Failure;
 use crate::tasks::diagnosis::{Silence, SilenceCause};
+use crate::tasks::log::checks::check_overheard;
 use crate::tasks::log::silence::{Silent, why_nothing};
 use crate::tasks::log::{LogFailure, Mode, RecordingReport, Remark};
 
 impl Recording<'_> {
     /// Ends the recording.
     pub(in crate::tasks::log) fn report(mut self) -> RecordingReport {
+        let overheard = self.overheard_nodes();
+        let failed = check_overheard(&overheard, self.options).err().filter(|_| self.tally.rows > 0);
+        self.ignore_without_signals(overheard.iter().map(|node| node.id).collect());
         let lost = self.liveness.lost(self.tally.end());
         self.remark_at_end();
         let two_devices = self.two_devices.values().cloned().collect();
         let replaced = self.replaced.iter().map(|&node| Failure::at(node, LogFailure::Replaced)).collect();
         let nothing = (self.tally.rows == 0).then(|| why_nothing(&self, self.options));
         RecordingReport {
-            failed: Vec::new(),
+            failed: failed.into_iter().collect(),
             two_devices,
             replaced,
             rows: self.tally.rows,
@@ -37,6 +42,14 @@ impl Recording<'_> {
             remarks: self.remarks,
             interrupted: self.interrupted,
         }
+    }
+
+    /// The nodes of a passive recording whose TPDOs are known. They are empty if no signals were requested: then nothing
+    /// can be missing.
+    pub(in crate::tasks::log) fn overheard_nodes(&self) -> Vec<Node> {
+        let listener = self.listener.as_ref().filter(|_| !self.options.wanted.is_empty());
+        let nodes = listener.into_iter().flat_map(|it| self.options.nodes.iter().map(|&node| it.known_node(node)));
+        nodes.filter(|node| !node.tpdos.is_empty()).collect()
     }
 
     fn remark_at_end(&mut self) {
