@@ -5,7 +5,7 @@
 
 mod asc;
 mod candump;
-
+mod date;
 mod error;
 mod format;
 mod lines;
@@ -269,9 +269,10 @@ impl Replay {
     fn read(&mut self, number: u64, bytes: &[u8]) -> Result<(), BusError> {
         let text = text_of(bytes);
         let text = text.trim();
+        let is_cut = self.lines.is_cut;
         let Some((format, parser)) = self.format_by(text)? else { return self.skip(number, bytes, text) };
-        // The last number of a decimal ASC line may be cut off.
-        let is_complete = *format != RecordingFormat::Asc || bytes.ends_with(b"\n");
+        // The last data of a cut file, or the last number of a decimal ASC line, may be incomplete.
+        let is_complete = bytes.ends_with(b"\n") || (*format != RecordingFormat::Asc && !is_cut);
         match parser.line(text) {
             Line::Event(wall, channel, event) if wall <= Wall::LAST && is_complete => {
                 self.take(number, wall, channel, event)
@@ -385,13 +386,14 @@ impl Replay {
     }
 
     fn not_a_recording(&self) -> BusError {
-        let error = match &self.format {
-            _ if self.lines.is_cut => RecordingError::CutOff,
-            Some((format, _)) => RecordingError::NoFrames(*format),
-            None if self.skipped.is_none() => RecordingError::Empty,
-            None => RecordingError::UnknownFormat,
-        };
-        self.wrong(None, error)
+        let first = self.skipped.map(|(_, first)| first);
+        match &self.format {
+            _ if self.lines.is_cut => self.wrong(None, RecordingError::CutOff),
+            Some((format, _)) if first.is_some() => self.wrong(first, RecordingError::NoneUnderstood(*format)),
+            Some((format, _)) => self.wrong(None, RecordingError::NoFrames(*format)),
+            None if first.is_none() => self.wrong(None, RecordingError::Empty),
+            None => self.wrong(None, RecordingError::UnknownFormat),
+        }
     }
 }
 

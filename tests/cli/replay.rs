@@ -163,7 +163,7 @@ fn truncated_answer_is_not_used_as_mapping() {
         let cut = |line: &str| if is_cut(&line) { line[..line.len() - 2].to_owned() } else { line.to_owned() };
         let lines: String = trace.lines().map(|line| cut(line) + "\n").collect();
         fs::write(bench.path("cut.log"), lines).expect("written");
-        let done = replay(&bench, "cut.log", "log 5,127").exit(0);
+        let done = replay(&bench, "cut.log", "log 5,127").exit(7);
         assert!(done.stdout.lines().skip(1).all(|line| line.split(',').nth(2) == Some("127")), "{}", done.stdout);
         let note = "node 5: TPDOs with COB-ID 185 are ignored: their mapping is unknown";
         assert!(done.stderr.contains(note), "{}", done.stderr);
@@ -269,7 +269,7 @@ fn commands_that_send_are_refused() {
     assert_eq!(
         done.stderr,
         "cangauge: the recording t.log can only receive\n\
-         hint: commands that only listen work on it: log, check, pdo watch, scan --passive, nmt watch\n"
+         hint: commands that only listen work on it: log, check, monitor, health, pdo watch, scan --passive, nmt watch\n"
     );
     replay(&bench, "t.log", "log 1 --sync 10ms")
         .refuses("a recording (replay:) is receive-only: --sync, --poll and --request send");
@@ -396,8 +396,8 @@ fn files_that_are_no_recordings_are_named() {
     for (text, message) in [
         ("", "replay t.log: the file is empty"),
         ("nonsense\n", "replay t.log: not a recording in a known format"),
-        ("date Mon Jan 1 10:00:00 2024\n", "replay t.log: this is a Vector ASC file without frames"),
-        (";$FILEVERSION=1.1\n", "replay t.log: this is a PEAK TRC file without frames"),
+        ("date Mon Jan 1 10:00:00 2024\n", "replay t.log: this is a Vector ASC file without classic CAN frames"),
+        (";$FILEVERSION=1.1\n", "replay t.log: this is a PEAK TRC file without classic CAN frames"),
     ] {
         let done = log_of(&bench, text).exit(8);
         assert!(done.stderr.starts_with(&format!("cangauge: {message}")), "{}", done.stderr);
@@ -411,8 +411,82 @@ fn files_that_are_no_recordings_are_named() {
         let done = log_of(&bench, bytes).exit(8);
         assert!(done.stderr.contains(hint) && done.stderr.contains("replay t.log: this is a"), "{}", done.stderr);
     }
+    for (text, hint) in [
+        ("***BUSMASTER Ver 3.2.2***\n", "with the format converters of BUSMASTER"),
+        ("Chn Identifier Flg   DLC  D0...1...2\n", "with the converter of Kvaser"),
+        ("Timestamp: 1.000000    ID: 0181    S Rx\n", "hint: record with: python3 -m can.logger -f run.log ..."),
+    ] {
+        let done = log_of(&bench, text).exit(8);
+        assert!(done.stderr.contains(hint), "{}", done.stderr);
+    }
     replay(&bench, "nowhere.log", "log 1").exit(8);
     replay(&bench, "", "log 1").exit(2);
+}
+
+/// Frames in a form that cannot be read: joined bytes, a decimal comma.
+#[test]
+fn frames_that_cannot_be_read_are_not_missing_frames() {
+    let bench = Bench::of("mh4@1");
+    for (text, message) in [
+        (
+            "(1700000000.000000)  can0  185   [2]  00`01\n",
+            "t.log:1: this looks like a candump log, but none of its lines",
+        ),
+        ("base hex timestamps absolute\n0,1 1 185 Rx d 1 00\n", "t.log:2: this looks like a Vector ASC file, but none"),
+    ] {
+        let done = log_of(&bench, text).exit(8);
+        assert!(done.stderr.contains(message) && done.stderr.contains("hint: "), "{}", done.stderr);
+    }
+}
+
+/// A recording of node 5 with one channel.
+#[test]
+fn requested_signals_and_nodes_that_are_missing_are_named() {
+    let bench = Bench::of("mh4@1");
+    fs::write(bench.path("t.log"), recording(|_, ms, id, data| format!("(1700000000.{ms:03}000) can0 {id}#{data}\n")))
+        .expect("written");
+    let missing = |signal: &str| {
+        format!("cangauge: none of the known TPDO mappings contains {signal}\nhint: they contain: ch1\n")
+    };
+    for line in ["log 5 ch2", "log all ch2", "check 5 ch2<1"] {
+        let done = replay(&bench, "t.log", line).exit(3);
+        assert!(done.stderr.ends_with(&missing("ch2")), "{line}: {}", done.stderr);
+    }
+    let done = replay(&bench, "t.log", "log 5 ch1 0x9130:1").exit(7);
+    assert!(done.stderr.ends_with(&missing("0x9130:1")) && done.stdout.lines().count() == 6, "{}", done.stderr);
+    let done = replay(&bench, "t.log", "log 5,6").exit(7);
+    assert!(done.stderr.ends_with("cangauge: node 6 lost: no measurements at the end\n"), "{}", done.stderr);
+    replay(&bench, "t.log", "log all").exit(0);
+}
+
+#[test]
+fn doctor_refuses_a_recording_and_nmt_watch_reads_it() {
+    let bench = Bench::of("mh4@1");
+    fs::write(bench.path("t.log"), "(1700000000.000000) can0 705#05\n").expect("written");
+    let done = replay(&bench, "t.log", "doctor --passive").exit(2);
+    assert!(
+        done.stderr.starts_with("cangauge: doctor examines nodes on a live bus, not in a recording"),
+        "{}",
+        done.stderr
+    );
+    let done = replay(&bench, "t.log", "nmt watch 5 -f json").exit(0);
+    assert_eq!(done.json()[0]["state"], "operational", "{}", done.stdout);
+}
+
+/// A controller that is not connected reports hundreds of errors a second.
+#[test]
+fn repeated_faults_are_counted() {
+    let bench = Bench::of("mh4@1");
+    let mut log = recording(|_, ms, id, data| format!("(1700000000.{ms:03}000) can0 {id}#{data}\n"));
+    for step in 0..1000 {
+        log += &format!("(17000000{:02}.{:03}000) can0 20000008#00000A0000000000\n", 1 + step / 500, step % 500 * 2);
+    }
+    fs::write(bench.path("t.log"), log).expect("written");
+    // The values end before the faults.
+    replay(&bench, "t.log", "log 5 --events e.csv").exit(3);
+    let events = bench.text("e.csv");
+    assert!(events.lines().count() < 6, "{events}");
+    assert!(events.contains("protocol error on the bus: "), "{events}");
 }
 
 #[test]

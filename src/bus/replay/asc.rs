@@ -3,7 +3,8 @@
 //! The header has the date and the number base. It also shows whether times count from the start or from the previous
 //! event.
 
-use super::text::{FrameOrFault, TimeZone, data_frame, date, digits, identifier, number, remote_frame, seconds};
+use super::date::date;
+use super::text::{FrameOrFault, TimeZone, data_frame, digits, identifier, number, remote_frame, seconds};
 use super::{Line, Parser};
 use crate::bus::{Fault, Wall};
 use crate::canopen::id::CanId;

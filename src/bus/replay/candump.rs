@@ -4,7 +4,7 @@
 //! `(1436509053.249713) can0 123 [2] 11 22`, and with `-tA` a date instead of the seconds. Without `-t` the screen form
 //! has no times.
 
-use super::text::{ERROR_FRAME, FrameOrFault, TimeZone, fault, number};
+use super::text::{ERROR_FRAME, FrameOrFault, TimeZone, digits, fault, number};
 use super::{Line, Parser};
 use crate::bus::Wall;
 use std::time::Duration;
@@ -32,9 +32,10 @@ impl Parser for Candump {
     }
 }
 
-/// Whether a line has the screen form without time.
+/// Whether a line has the screen form or the log form without time.
 pub(super) fn has_no_time(text: &str) -> bool {
-    screen_frame(text).is_some()
+    let mut words = text.split_ascii_whitespace().skip(1);
+    screen_frame(text).is_some() || words.next().is_some_and(|frame| log_frame(frame).is_some())
 }
 
 /// The frame of `candump -L`; `Some(None)` for CAN FD.
@@ -42,6 +43,9 @@ fn log_frame(text: &str) -> Option<Option<FrameOrFault>> {
     if text.contains("##") {
         return Some(None);
     }
+    // `candump -8` adds the data length code to frames with eight bytes: `123#1122334455667788_C`.
+    let is_code = |code: &str| matches!(code.as_bytes(), [b'9' | b'A'..=b'F' | b'a'..=b'f']);
+    let text = text.rsplit_once('_').filter(|(_, code)| is_code(code)).map_or(text, |(frame, _)| frame);
     if let Ok(frame) = text.parse() {
         return Some(Some(Ok(frame)));
     }
@@ -50,28 +54,33 @@ fn log_frame(text: &str) -> Option<Option<FrameOrFault>> {
     Some(Some(Err(fault(id))))
 }
 
-/// The frame of the screen form, `can0  123   [2]  11 22`, with or without direction and ASCII column.
+/// The frame of the screen form, `can0  123   [2]  11 22`, with or without direction and ASCII column. `Some(None)` for
+/// CAN FD.
 fn screen_frame(text: &str) -> Option<Option<FrameOrFault>> {
     let mut words = text.split_ascii_whitespace().skip(1).peekable();
     let mut id = words.next()?;
     // `candump -x` writes the direction before the identifier.
-    while words.peek().is_some_and(|word| !word.starts_with('[')) {
+    while words.peek().is_some_and(|word| !word.starts_with(['[', '{'])) {
         id = words.next()?;
     }
-    let length = words.next()?.strip_prefix('[')?.strip_suffix(']')?;
-    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let is_id = matches!(id.len(), 3 | 8) && id.bytes().all(|byte| byte.is_ascii_hexdigit());
-    if !is_id || !is_number(length) {
-        return None;
-    }
-    if length.len() > 1 {
-        return Some(None);
-    }
+    let length = words.next().filter(|_| is_id)?;
+    let length = if let Some(code) = length.strip_prefix('{') {
+        // `candump -8` writes the data length code. Codes above 8 mean eight bytes.
+        digits(code.strip_suffix('}')?, 16)?.min(8) as usize
+    } else {
+        let length = length.strip_prefix('[')?.strip_suffix(']')?;
+        let is_number = !length.is_empty() && length.bytes().all(|byte| byte.is_ascii_digit());
+        match length.len() {
+            1 if is_number => length.parse().ok()?,
+            _ if is_number => return Some(None),
+            _ => return None,
+        }
+    };
     let number = u32::from_str_radix(id, 16).ok()?;
     if id.len() == 8 && number & ERROR_FRAME != 0 {
         return Some(Some(Err(fault(number))));
     }
-    let length: usize = length.parse().ok()?;
     if words.peek() == Some(&"remote") {
         return Some(Some(Ok(format!("{id}#R{length}").parse().ok()?)));
     }
@@ -135,6 +144,7 @@ mod tests {
             "(1436509053.249713) can0 123#1122 R",
             "(1436509053.249713)  can0  123   [2]  11 22",
             "(1436509053.249713)  can0  RX - -  123   [2]  11 22   '.\"'",
+            "(1436509053.249713)  can0  123   {2}  11 22",
         ] {
             assert_eq!(frame(text), Some((at, "can0 123#1122".to_owned())), "{text}");
         }
@@ -144,9 +154,21 @@ mod tests {
     }
 
     #[test]
-    fn the_screen_form_without_times_is_recognised() {
-        for text in ["can0  605   [8]  40 00 10 00 00 00 00 00", "vcan0  00000123   [0]", "can0  TX B E  605   [1]  40"]
-        {
+    fn data_length_codes_above_8_are_eight_bytes() {
+        for text in ["(1.5) can0 123#1122334455667788_C", "(1.5)  can0  123   {C}  11 22 33 44 55 66 77 88"] {
+            let expected = (Duration::from_millis(1500), "can0 123#1122334455667788".to_owned());
+            assert_eq!(frame(text), Some(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn frames_without_times_are_recognised() {
+        for text in [
+            "can0  605   [8]  40 00 10 00 00 00 00 00",
+            "vcan0  00000123   [0]",
+            "can0  TX B E  605   [1]  40",
+            "can0 605#4000100000000000",
+        ] {
             assert_eq!(parse(text), Line::WithoutTime, "{text}");
         }
     }
@@ -180,6 +202,8 @@ mod tests {
             "(1.5) c",
             "(1.5)",
             "(1.5)  can0  123   [2]  11",
+            "(1.5)  can0  123   {X}  11",
+            "(1.5) can0 123#11_Z",
             "(1.5)  can0  123   [2]  00010001 00100010",
             "(2000-01-02 00:00.5) can0 181#01",
         ] {

@@ -15,8 +15,11 @@ pub enum RecordingError {
     #[error("not a recording in a known format (candump, Vector ASC, PEAK TRC, CSV of python-can)")]
     UnknownFormat,
     /// The format is known, but no line contains a frame.
-    #[error("this is {} without frames", .0.name())]
+    #[error("this is {} without classic CAN frames", .0.name())]
     NoFrames(RecordingFormat),
+    /// The format is known, but none of its lines is a frame that the format allows.
+    #[error("this looks like {}, but none of its lines could be read", .0.name())]
+    NoneUnderstood(RecordingFormat),
     /// The compressed data ends before its first line.
     #[error("the file is cut off: its first line is incomplete")]
     CutOff,

@@ -45,6 +45,18 @@ pub enum FileFormat {
     Utf16,
     /// CSV of SavvyCAN.
     SavvyCanCsv,
+    /// A log of BUSMASTER.
+    Busmaster,
+    /// Text or CSV of Kvaser.
+    Kvaser,
+    /// CSV of the IXXAT analyser.
+    Ixxat,
+    /// CSV of Vehicle Spy.
+    VehicleSpy,
+    /// CSV of the CANedge.
+    CanEdge,
+    /// The screen output of python-can.
+    PythonCanScreen,
     /// Measurements that `cangauge log` wrote.
     Measurements,
     /// XML.
@@ -85,6 +97,14 @@ impl RecordingFormat {
             (";####", Ok(RecordingFormat::Trc)),
             (python_can::HEADER, Ok(RecordingFormat::PythonCanCsv)),
             ("time stamp,id,", Err(FileFormat::SavvyCanCsv)),
+            ("***busmaster", Err(FileFormat::Busmaster)),
+            ("chn identifier", Err(FileFormat::Kvaser)),
+            ("time,channel,id,dlc,flags", Err(FileFormat::Kvaser)),
+            ("\"ascii trace ixxat", Err(FileFormat::Ixxat)),
+            ("ascii trace ixxat", Err(FileFormat::Ixxat)),
+            ("line,abs time(sec)", Err(FileFormat::VehicleSpy)),
+            ("timestampepoch;", Err(FileFormat::CanEdge)),
+            ("timestamp:", Err(FileFormat::PythonCanScreen)),
             ("time,elapsed_s,", Err(FileFormat::Measurements)),
             ("<", Err(FileFormat::Xml)),
         ];
@@ -128,6 +148,12 @@ impl FileFormat {
             FileFormat::Pcap => "a Wireshark capture",
             FileFormat::Utf16 => "text in UTF-16",
             FileFormat::SavvyCanCsv => "a CSV file of SavvyCAN",
+            FileFormat::Busmaster => "a BUSMASTER log",
+            FileFormat::Kvaser => "a text file of Kvaser",
+            FileFormat::Ixxat => "a trace of the IXXAT analyser",
+            FileFormat::VehicleSpy => "a CSV file of Vehicle Spy",
+            FileFormat::CanEdge => "a CSV file of the CANedge",
+            FileFormat::PythonCanScreen => "the screen output of python-can",
             FileFormat::Measurements => "a CSV file of measurements",
             FileFormat::Xml => "an XML file",
         }

@@ -128,17 +128,27 @@ fn files_that_are_no_recordings_are_named() {
         ("# a comment\n", "the file is empty"),
         ("nonsense\nmore\n", unknown),
         ("\x7fELF\x02\x01\x01\0\0\0", unknown),
-        ("(1.5) can0 181\n", "this is a candump log without frames"),
-        ("date Mon Jan 1 10:00:00 2024\nbase hex  timestamps absolute\n", "this is a Vector ASC file without frames"),
-        (";$FILEVERSION=2.1\n;\n", "this is a PEAK TRC file without frames"),
-        ("; exported\n;$FILEVERSION=1.1\n;\n", "this is a PEAK TRC file without frames"),
-        ("timestamp,arbitration_id,extended\n", "this is a CSV file of python-can without frames"),
+        (
+            "date Mon Jan 1 10:00:00 2024\nbase hex  timestamps absolute\n",
+            "this is a Vector ASC file without classic CAN frames",
+        ),
+        (";$FILEVERSION=2.1\n;\n", "this is a PEAK TRC file without classic CAN frames"),
+        ("; exported\n;$FILEVERSION=1.1\n;\n", "this is a PEAK TRC file without classic CAN frames"),
+        ("timestamp,arbitration_id,extended\n", "this is a CSV file of python-can without classic CAN frames"),
     ] {
         assert_eq!(all(text), [format!("replay x.log: {message}")], "{text}");
     }
+    let cut = "replay x.log:1: this looks like a candump log, but none of its lines could be read";
+    assert_eq!(all("(1.5) can0 181\n"), [cut]);
     for (text, name) in [
         ("time,elapsed_s,node,signal,value,unit,status,raw\n", "a CSV file of measurements"),
         ("Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n", "a CSV file of SavvyCAN"),
+        ("***BUSMASTER Ver 3.2.2***\n", "a BUSMASTER log"),
+        ("Chn Identifier Flg   DLC\n", "a text file of Kvaser"),
+        ("\"ASCII Trace IXXAT minimon V3.5\"\n", "a trace of the IXXAT analyser"),
+        ("Line,Abs Time(Sec),Rel Time (Sec)\n", "a CSV file of Vehicle Spy"),
+        ("TimestampEpoch;BusChannel;ID\n", "a CSV file of the CANedge"),
+        ("Timestamp: 1.0 ID: 0181\n", "the screen output of python-can"),
         ("<?xml version=\"1.0\"?>\n", "an XML file"),
         ("LOGG\x01\x02", "a Vector BLF file"),
         ("\n\r\r\n\x1c\0\0\0", "a Wireshark capture"),

@@ -20,22 +20,6 @@ const MAX_DIGITS: usize = 15;
 const SECOND: Duration = Duration::from_secs(1);
 const MILLISECOND: Duration = Duration::from_millis(1);
 
-/// Names of months as Vector writes them, in English and German; the `ä` of `Mär` may be unreadable.
-const MONTHS: [&[&str]; 12] = [
-    &["jan"],
-    &["feb"],
-    &["mar", "m\u{e4}r", "m\u{fffd}r"],
-    &["apr"],
-    &["may", "mai"],
-    &["jun"],
-    &["jul"],
-    &["aug"],
-    &["sep"],
-    &["oct", "okt"],
-    &["nov"],
-    &["dec", "dez"],
-];
-
 /// Parses digits only: `parse` would also accept a sign.
 pub(super) fn number(text: &str) -> Option<u64> {
     if text.bytes().all(|byte| byte.is_ascii_digit()) { text.parse().ok() } else { None }
@@ -60,56 +44,6 @@ pub(super) fn seconds(text: &str) -> Option<Duration> {
 /// `1059.9` or `1841`.
 pub(super) fn milliseconds(text: &str) -> Option<Duration> {
     decimal(text, MILLISECOND)
-}
-
-/// A date and time as time since 1970: `Tue Nov 14 10:13:20.250 pm 2023`, `14.11.2023 22:13:20.250`,
-/// `11/14/2023 10:13:20 PM`, `2023-11-14 22:13:20`.
-pub(super) fn date(text: &str, zone: TimeZone) -> Option<Duration> {
-    let (mut fields, mut fraction, mut is_afternoon) = ([None; 6], Duration::ZERO, None);
-    for word in text.split_ascii_whitespace() {
-        let word = word.to_lowercase();
-        match word.as_str() {
-            "am" => is_afternoon = Some(false),
-            "pm" => is_afternoon = Some(true),
-            _ if word.contains(':') => {
-                let (time, part) = word.split_once('.').unwrap_or((&word, "0"));
-                let time: Vec<_> = time.split(':').map(small).collect();
-                fields.get_mut(3..3 + time.len())?.copy_from_slice(&time);
-                // Three digits are milliseconds. python-can writes no leading zeros.
-                let is_milliseconds = part.split('.').next().is_some_and(|digits| digits.len() <= 3);
-                fraction = if is_milliseconds { milliseconds(part)? } else { seconds(&format!("0.{part}"))? };
-            }
-            _ => day(&word, &mut fields),
-        }
-    }
-    if let (Some(afternoon), Some(hour)) = (is_afternoon, &mut fields[3]) {
-        *hour = *hour % 12 + if afternoon { 12 } else { 0 };
-    }
-    let mut numbers = [0; 6];
-    for (number, field) in numbers.iter_mut().zip(fields) {
-        *number = field?;
-    }
-    Some(Duration::from_secs(zone(numbers)?) + fraction)
-}
-
-/// Parses a part of the day, month and year. Ignores other words, which are names of days.
-fn day(word: &str, fields: &mut [Option<i32>; 6]) {
-    let numbers = |separator| word.split(separator).map(small).collect::<Vec<_>>();
-    if let [Some(day), Some(month), Some(year)] = numbers('.')[..] {
-        fields[..3].copy_from_slice(&[Some(year), Some(month), Some(day)]);
-    } else if let [Some(month), Some(day), Some(year)] = numbers('/')[..] {
-        fields[..3].copy_from_slice(&[Some(year), Some(month), Some(day)]);
-    } else if let [Some(year), Some(month), Some(day)] = numbers('-')[..] {
-        fields[..3].copy_from_slice(&[Some(year), Some(month), Some(day)]);
-    } else if let Some(number) = small(word) {
-        fields[if number > 31 { 0 } else { 2 }] = Some(number);
-    } else if let Some(month) = MONTHS.iter().zip(1..).find(|(names, _)| names.iter().any(|it| word.starts_with(it))) {
-        fields[1] = Some(month.1);
-    }
-}
-
-fn small(text: &str) -> Option<i32> {
-    number(text).and_then(|number| i32::try_from(number).ok())
 }
 
 /// An identifier in this number base.
@@ -193,29 +127,6 @@ mod tests {
         assert_eq!(decimal("2.5", Duration::from_secs(86_400)), Some(Duration::from_secs(216_000)));
         for wrong in ["", ".", "1.", "-1.0", "1.-5", "+1.0", "1e5", "99999999999999999999.0", "1.5.2"] {
             assert_eq!(seconds(wrong), None, "{wrong}");
-        }
-    }
-
-    #[test]
-    fn dates_of_several_tools() {
-        let expected = Duration::from_millis(((13 * 86_400) + 22 * 3_600 + 13 * 60 + 20) * 1000 + 250);
-        let expected = expected + Duration::from_secs(10 * 31 * 86_400);
-        for text in [
-            "Tue Nov 14 10:13:20.250 pm 2000",
-            "Die Nov 14 22:13:20.250 2000",
-            "14.11.2000 22:13:20.250",
-            "11/14/2000 10:13:20.250 PM",
-            "2000-11-14 22:13:20.250000",
-        ] {
-            assert_eq!(date(text, test_zone), Some(expected), "{text}");
-        }
-        let noon = |text| date(text, test_zone).map(|time| time.as_millis());
-        assert_eq!(noon("Sam Jan 1 12:00:00 am 2000"), Some(0));
-        assert_eq!(noon("Sat Jan 1 12:00:00.5 pm 2000"), Some(43_200_005));
-        assert_eq!(noon("1.1.2000 00:00:00.484.3"), Some(484));
-        assert_eq!(noon("Mit M\u{fffd}r 1 00:00:00 2000"), Some(2 * 31 * 86_400_000));
-        for wrong in ["", "Nov 14 22:13:20", "22:13:20 2000", "Nov 14 2000", "Tue Nov 14 22:13:20:00:00 2000"] {
-            assert_eq!(date(wrong, test_zone), None, "{wrong}");
         }
     }
 }

@@ -3,8 +3,9 @@
 //! The columns are named by letters, as in the header of version 2: N number, O time after the start in milliseconds,
 //! B bus, T type, I identifier, d direction, R reserved, l or L length, D data.
 
+use super::date::date;
 use super::text::{
-    FrameOrFault, TimeZone, data_frame, date, decimal, digits, identifier, milliseconds, number, remote_frame,
+    FrameOrFault, TimeZone, data_frame, decimal, digits, identifier, milliseconds, number, remote_frame,
 };
 use super::{Line, Parser};
 use crate::bus::{Fault, Wall};

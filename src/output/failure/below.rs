@@ -1,7 +1,7 @@
 //! Text for causes from the layers below the tasks: bus, SDO, LSS, expressions.
 
 use super::{Place, Words};
-use crate::bus::replay::{FileFormat, RecordingError};
+use crate::bus::replay::{FileFormat, RecordingError, RecordingFormat};
 use crate::bus::time::format_duration;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss::Service;
@@ -43,8 +43,7 @@ pub(super) fn bus(error: &BusError) -> Words {
             words.hint(format!("leave this mode: sudo cangauge bus up {name} 250k (use the sensors' bit rate)"))
         }
         BusError::ReceiveOnly(_) => words.hint(
-            "commands that only listen work on it: log, check, pdo watch, scan --passive, nmt \
-             watch",
+            "commands that only listen work on it: log, check, monitor, health, pdo watch, scan --passive, nmt watch",
         ),
         BusError::InUse(_) => words.hint("wait until it ends, or stop it; to ignore it, add --ignore-lock"),
         BusError::Recording { file, error, .. } => match recording_hint(file, error) {
@@ -65,7 +64,13 @@ fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
         |name: &str| format!("choose one: -b replay:{}:{name}", if file == "standard input" { "-" } else { file });
     Some(match error {
         RecordingError::Empty | RecordingError::NoFrames(_) | RecordingError::CutOff => return None,
-        RecordingError::UnknownFormat => "record with: candump -L can0".to_owned(),
+        RecordingError::UnknownFormat | RecordingError::NoneUnderstood(RecordingFormat::Candump) => {
+            "record with: candump -L can0".to_owned()
+        }
+        RecordingError::NoneUnderstood(RecordingFormat::Asc) => {
+            "save it with numbers as identifiers and with decimal points".to_owned()
+        }
+        RecordingError::NoneUnderstood(_) => "save it again with the program that recorded it".to_owned(),
         RecordingError::SeveralChannels(first, _) => channel(first),
         RecordingError::NoChannel { channels, .. } => match channels.first() {
             Some(first) => channel(first),
@@ -93,6 +98,11 @@ fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
                  done > {converted}"
             ),
             FileFormat::SavvyCanCsv => "save it from SavvyCAN as a candump log".to_owned(),
+            FileFormat::Busmaster => "convert it to Vector ASC with the format converters of BUSMASTER".to_owned(),
+            FileFormat::Kvaser => "convert it to Vector ASC with the converter of Kvaser".to_owned(),
+            FileFormat::Ixxat | FileFormat::VehicleSpy => "save it in this program as Vector ASC".to_owned(),
+            FileFormat::CanEdge => "convert the MF4 file to Vector ASC: mdf2asc (CSS Electronics)".to_owned(),
+            FileFormat::PythonCanScreen => "record with: python3 -m can.logger -f run.log ...".to_owned(),
             FileFormat::Measurements => {
                 "replay needs the frames: record them with --trace FILE or candump -L".to_owned()
             }
