@@ -1,7 +1,8 @@
 //! Compares the samples of one node with one expression.
 
 use super::bind::{Aggregate, BoundExpression, ShownQuantity};
-use super::formula::{Formula, Values};
+use super::formula::{Formula, Rule, Values};
+use super::series::{SeriesId, SharedSignals};
 use super::tree::Function;
 use super::verdict::{LiveResult, MissingData, Outcome, QuantityValue, Reason, Verdict, Violation};
 use crate::bus::{Mono, Stamp};
@@ -78,6 +79,40 @@ enum Purpose {
     Show(usize),
 }
 
+/// The statistics of a formula.
+#[derive(Clone, Debug)]
+enum Figures {
+    /// The formula has one input: other expressions use the same statistics.
+    Shared(SeriesId),
+    Own(Box<Statistics>),
+}
+
+impl Figures {
+    /// The statistics of a formula of an expression that is bound now. `places` are the places of its inputs.
+    fn new(formula: &Formula, places: &[usize], signals: &mut SharedSignals) -> Figures {
+        let mut inputs = Vec::new();
+        formula.inputs(&mut inputs);
+        match inputs[..] {
+            [input] => Figures::Shared(signals.series(places[input], formula)),
+            _ => Figures::Own(Box::default()),
+        }
+    }
+
+    fn get<'a>(&'a self, signals: &'a SharedSignals) -> &'a Statistics {
+        match self {
+            Figures::Shared(id) => signals.statistics(*id),
+            Figures::Own(statistics) => statistics,
+        }
+    }
+
+    /// Adds a value, unless [`SharedSignals::add`] does so.
+    fn add(&mut self, value: Option<f64>, at: Duration) {
+        if let Figures::Own(statistics) = self {
+            statistics.add(value, at);
+        }
+    }
+}
+
 /// When a sample was received, the time since the first sample, and the status from the device.
 pub(super) type SampleContext = (Stamp, Duration, Option<Status>);
 
@@ -92,15 +127,22 @@ pub(super) struct Comparison {
     groups: Vec<(InputGroup, Purpose)>,
     /// For each rule: the number of evaluated samples, and the number of those without a valid value.
     evaluated: Vec<(u64, u64)>,
-    aggregates: Vec<Statistics>,
-    shown: Vec<Statistics>,
+    aggregates: Vec<Figures>,
+    shown: Vec<Figures>,
+    /// The place of each input in the shared signals.
+    places: Vec<usize>,
     violations: u64,
     first: Option<Violation>,
     last: Option<SampleContext>,
 }
 
 impl Comparison {
-    pub(super) fn new(bound: BoundExpression) -> Comparison {
+    pub(super) fn new(mut bound: BoundExpression, signals: &mut SharedSignals) -> Comparison {
+        bound.sample_rules.iter_mut().for_each(Rule::fold);
+        let places: Vec<usize> = bound.inputs.iter().map(|input| signals.signal(input)).collect();
+        let mut figures = |formula: &Formula| Figures::new(formula, &places, signals);
+        let shown: Vec<Figures> = bound.shown.iter().map(|shown| figures(&shown.formula)).collect();
+        let aggregates: Vec<Figures> = bound.aggregates.iter().map(|it| figures(&it.argument)).collect();
         let group = |add_inputs: &dyn Fn(&mut Vec<usize>), purpose| {
             let mut inputs = Vec::new();
             add_inputs(&mut inputs);
@@ -108,7 +150,9 @@ impl Comparison {
         };
         let mut groups = Vec::new();
         // Shown values come first: a violation contains the values of its own sample.
-        for (at, shown) in bound.shown.iter().enumerate() {
+        let own = |(_, figures): &(usize, &Figures)| matches!(figures, Figures::Own(_));
+        for (at, _) in shown.iter().enumerate().filter(own) {
+            let shown = &bound.shown[at];
             groups.push(group(&|inputs| shown.formula.inputs(inputs), Purpose::Show(at)));
         }
         for (at, rule) in bound.sample_rules.iter().enumerate() {
@@ -117,14 +161,17 @@ impl Comparison {
         for (at, aggregate) in bound.aggregates.iter().enumerate() {
             groups.push(group(&|inputs| aggregate.argument.inputs(inputs), Purpose::Aggregate(at)));
         }
+        // A formula without inputs is never evaluated for a sample.
+        groups.retain(|(group, _)| !group.inputs.is_empty());
         Comparison {
             values: vec![None; bound.inputs.len()],
             arrivals: vec![Arrivals::default(); bound.inputs.len()],
             digits: vec![None; bound.inputs.len()],
             groups,
             evaluated: vec![(0, 0); bound.sample_rules.len()],
-            aggregates: vec![Statistics::default(); bound.aggregates.len()],
-            shown: vec![Statistics::default(); bound.shown.len()],
+            aggregates,
+            shown,
+            places,
             violations: 0,
             first: None,
             last: None,
@@ -136,8 +183,24 @@ impl Comparison {
         &self.bound
     }
 
+    /// The place of each input in the shared signals.
+    pub(super) fn places(&self) -> &[usize] {
+        &self.places
+    }
+
     /// Adds a value of an input.
     pub(super) fn add(&mut self, input: usize, value: Option<f64>, digits: Option<u8>, context: SampleContext) {
+        if let ([only], [arrivals]) = (&mut self.values[..], &mut self.arrivals[..]) {
+            // Nothing waits for another input.
+            *only = value;
+            arrivals.add(context.0.mono);
+            self.digits[input] = digits.or(self.digits[input]);
+            self.last = Some(context);
+            for at in 0..self.groups.len() {
+                self.evaluate(self.groups[at].1, context);
+            }
+            return;
+        }
         // If another input has no new value yet, the old value is evaluated before it is replaced.
         self.evaluate_groups(|group| group.is_fresh(input), self.last.unwrap_or(context));
         self.values[input] = value;
@@ -206,45 +269,36 @@ impl Comparison {
     }
 
     /// The present value of each function.
-    fn aggregate_values(&self) -> Vec<Option<f64>> {
-        let value = |(aggregate, statistics): (&Aggregate, &Statistics)| match aggregate.function {
-            Function::Mean => statistics.mean(),
-            Function::Noise => statistics.deviation(),
-            Function::Min => statistics.min(),
-            Function::Max => statistics.max(),
-            Function::Rate => statistics.rate(),
-            Function::Gap => (statistics.count() > 1).then(|| statistics.longest_interval().as_secs_f64()),
-            Function::Count => Some(statistics.count() as f64),
-            Function::Invalid => Some(statistics.invalid() as f64),
-        };
-        self.bound.aggregates.iter().zip(&self.aggregates).map(value).collect()
+    fn aggregate_values(&self, signals: &SharedSignals) -> Vec<Option<f64>> {
+        let of = |(aggregate, figures): (&Aggregate, &Figures)| value(aggregate.function, figures.get(signals));
+        self.bound.aggregates.iter().zip(&self.aggregates).map(of).collect()
     }
 
-    fn count(&self) -> u64 {
-        let aggregates = self.aggregates.iter().map(Statistics::count);
+    fn count(&self, signals: &SharedSignals) -> u64 {
+        let aggregates = self.aggregates.iter().map(|figures| figures.get(signals).count());
         self.evaluated.iter().map(|&(evaluated, _)| evaluated).chain(aggregates).max().unwrap_or(0)
     }
 
     /// The number of samples without a valid value. Samples inside `invalid()` do not count.
-    fn invalid(&self) -> u64 {
+    fn invalid(&self, signals: &SharedSignals) -> u64 {
         let counts = |aggregate: &Aggregate| aggregate.function != Function::Invalid;
         let aggregates = self.bound.aggregates.iter().zip(&self.aggregates).filter(|(aggregate, _)| counts(aggregate));
-        let aggregates = aggregates.map(|(_, statistics)| statistics.invalid());
+        let aggregates = aggregates.map(|(_, figures)| figures.get(signals).invalid());
         self.evaluated.iter().map(|&(_, invalid)| invalid).chain(aggregates).max().unwrap_or(0)
     }
 
     /// The verdict. `end` is the end of the recording: a signal that stopped earlier has no verdict.
-    pub(super) fn verdict(&self, end: Option<Mono>, missing: &[MissingData]) -> Verdict {
-        let aggregates = self.aggregate_values();
-        let (outcome, reason) = self.outcome(&aggregates, end, missing);
+    pub(super) fn verdict(&self, signals: &SharedSignals, end: Option<Mono>, missing: &[MissingData]) -> Verdict {
+        let aggregates = self.aggregate_values(signals);
+        let (outcome, reason) = self.outcome((&aggregates, signals), end, missing);
         Verdict {
             text: self.bound.text.clone(),
             node: self.bound.node,
             outcome,
-            values: self.quantities(&aggregates, false),
-            count: self.count(),
+            values: self.quantities((&aggregates, signals), false),
+            count: self.count(signals),
             violations: self.violations,
-            invalid: self.invalid(),
+            invalid: self.invalid(signals),
             first: self.first.clone(),
             reason,
         }
@@ -252,11 +306,11 @@ impl Comparison {
 
     fn outcome(
         &self,
-        aggregates: &[Option<f64>],
+        (aggregates, signals): (&[Option<f64>], &SharedSignals),
         end: Option<Mono>,
         missing: &[MissingData],
     ) -> (Outcome, Option<Reason>) {
-        if self.violations > 0 || self.invalid() > 0 {
+        if self.violations > 0 || self.invalid(signals) > 0 {
             return (Outcome::Fail, None);
         }
         let is_needed = |missing: &&MissingData| {
@@ -289,20 +343,21 @@ impl Comparison {
         (Outcome::Ok, None)
     }
 
-    pub(super) fn live_result(&self) -> LiveResult {
-        let aggregates = self.aggregate_values();
-        let is_satisfied = match self.outcome(&aggregates, None, &[]).0 {
+    pub(super) fn live_result(&self, signals: &SharedSignals) -> LiveResult {
+        let aggregates = self.aggregate_values(signals);
+        let is_satisfied = match self.outcome((&aggregates, signals), None, &[]).0 {
             Outcome::Ok => Some(true),
             Outcome::Fail => Some(false),
             Outcome::NoData => None,
         };
-        let values = self.quantities(&aggregates, true);
+        let values = self.quantities((&aggregates, signals), true);
         LiveResult { text: self.bound.text.clone(), node: self.bound.node, is_satisfied, values }
     }
 
     /// The quantities with their latest values, or with mean and range if `latest` is false.
-    fn quantities(&self, aggregates: &[Option<f64>], latest: bool) -> Vec<QuantityValue> {
-        let quantity = |(shown, statistics): (&ShownQuantity, &Statistics)| {
+    fn quantities(&self, (aggregates, signals): (&[Option<f64>], &SharedSignals), latest: bool) -> Vec<QuantityValue> {
+        let quantity = |(shown, figures): (&ShownQuantity, &Figures)| {
+            let statistics = figures.get(signals);
             let values = Values { inputs: &self.values, aggregates };
             let has_several = statistics.count() > 1 && !latest;
             QuantityValue {
@@ -345,5 +400,19 @@ impl Comparison {
             Formula::Aggregate(at) if is_count(at) => true,
             other => matches!(self.digits_source(other), Some(Formula::Input(_))),
         }
+    }
+}
+
+/// The present value of a function.
+fn value(function: Function, statistics: &Statistics) -> Option<f64> {
+    match function {
+        Function::Mean => statistics.mean(),
+        Function::Noise => statistics.deviation(),
+        Function::Min => statistics.min(),
+        Function::Max => statistics.max(),
+        Function::Rate => statistics.rate(),
+        Function::Gap => (statistics.count() > 1).then(|| statistics.longest_interval().as_secs_f64()),
+        Function::Count => Some(statistics.count() as f64),
+        Function::Invalid => Some(statistics.invalid() as f64),
     }
 }

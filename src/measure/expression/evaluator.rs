@@ -7,6 +7,7 @@
 
 use super::bind::{AvailableSignals, BareLimit, BoundExpression, unit_of};
 use super::comparison::Comparison;
+use super::series::SharedSignals;
 use super::verdict::{LiveResult, MissingData, Reason, Verdict};
 use super::{Expression, ExpressionError};
 use crate::bus::Mono;
@@ -15,12 +16,13 @@ use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
 use crate::measure::sample::{Doubt, Number, Sample, Source, Status};
 
-/// Connects a source of samples to an input of a comparison.
-#[derive(Clone, Copy, Debug)]
+/// Connects a source of samples to a signal of expressions.
+#[derive(Clone, Debug)]
 struct Route {
-    comparison: usize,
-    input: usize,
+    signal: usize,
     unit: UnitChange,
+    /// The comparisons with this signal, each with the number of the input.
+    inputs: Vec<(usize, usize)>,
 }
 
 /// Whether a source still has the unit that its input expects.
@@ -38,6 +40,7 @@ enum UnitChange {
 pub struct Evaluator {
     expressions: Vec<Expression>,
     comparisons: Vec<Comparison>,
+    signals: SharedSignals,
     /// Verdicts of expressions that cannot be measured.
     without_data: Vec<Verdict>,
     /// The routes of each source, in the order of the sources.
@@ -54,7 +57,9 @@ impl Evaluator {
                 expressions.push(expression.clone());
             }
         }
-        Evaluator { expressions, comparisons: Vec::new(), without_data: Vec::new(), routes: Vec::new(), first: None }
+        let signals = SharedSignals::default();
+        let (comparisons, without_data, routes) = (Vec::new(), Vec::new(), Vec::new());
+        Evaluator { expressions, comparisons, signals, without_data, routes, first: None }
     }
 
     /// Finds the signals of the expressions. An expression without a node is evaluated for each of `nodes`.
@@ -85,7 +90,8 @@ impl Evaluator {
                     let node = Some(*node).filter(|_| for_each);
                     self.without_data.push(Verdict::no_data(expression.text(), node, reason.clone()));
                 } else if !for_each || !may_skip || has_signals(node) {
-                    self.comparisons.push(Comparison::new(expression.bind(Some(*node), available)?));
+                    let bound = expression.bind(Some(*node), available)?;
+                    self.comparisons.push(Comparison::new(bound, &mut self.signals));
                 }
             }
         }
@@ -106,7 +112,8 @@ impl Evaluator {
                     bound.text == expression.text() && bound.node == node_of_comparison
                 };
                 if available.has_all(node, expression) && !self.comparisons.iter().any(is_bound) {
-                    self.comparisons.push(Comparison::new(expression.bind(node_of_comparison, &available)?));
+                    let bound = expression.bind(node_of_comparison, &available)?;
+                    self.comparisons.push(Comparison::new(bound, &mut self.signals));
                     self.routes.clear();
                 }
             }
@@ -162,16 +169,18 @@ impl Evaluator {
     /// Adds samples in the order in which they were received.
     pub fn add(&mut self, samples: &[Sample], sources: &[Source]) {
         for source in sources.iter().skip(self.routes.len()) {
-            self.routes.push(routes(&self.comparisons, source));
+            self.routes.push(routes(&self.comparisons, &self.signals, source));
         }
         for sample in samples {
             let first = *self.first.get_or_insert(sample.at.mono);
             let elapsed = sample.at.mono.since(first);
-            for route in self.routes.get(sample.source).into_iter().flatten() {
-                // Without its decimal digits, a number may be wrong by a power of ten.
-                let is_scaled = sample.doubt != Some(Doubt::UnknownDigits);
-                let is_valid = is_scaled && !sample.status.is_some_and(Status::is_overload);
-                let value = sample.value.filter(|_| is_valid).map(printed_value).and_then(|value| match route.unit {
+            let Some(routes) = self.routes.get(sample.source).filter(|routes| !routes.is_empty()) else { continue };
+            // Without its decimal digits, a number may be wrong by a power of ten.
+            let is_scaled = sample.doubt != Some(Doubt::UnknownDigits);
+            let is_valid = is_scaled && !sample.status.is_some_and(Status::is_overload);
+            let value = sample.value.filter(|_| is_valid).map(printed_value);
+            for route in routes {
+                let value = value.and_then(|value| match route.unit {
                     UnitChange::Unchanged => Some(value),
                     UnitChange::Convertible(from, to) => from.convert(value, to),
                     UnitChange::Incompatible => None,
@@ -180,8 +189,9 @@ impl Evaluator {
                     (Some(Number::Decimal { digits, .. }), UnitChange::Unchanged) => Some(digits),
                     _ => None,
                 };
-                if let Some(comparison) = self.comparisons.get_mut(route.comparison) {
-                    comparison.add(route.input, value, digits, (sample.at, elapsed, sample.status));
+                self.signals.add(route.signal, value, sample.at.mono.since_start());
+                for &(comparison, input) in &route.inputs {
+                    self.comparisons[comparison].add(input, value, digits, (sample.at, elapsed, sample.status));
                 }
             }
         }
@@ -189,7 +199,7 @@ impl Evaluator {
 
     /// The present state of all expressions.
     pub fn live_results(&self) -> Vec<LiveResult> {
-        self.comparisons.iter().map(Comparison::live_result).collect()
+        self.comparisons.iter().map(|comparison| comparison.live_result(&self.signals)).collect()
     }
 
     /// Returns the verdicts, sorted by expression and node.
@@ -203,7 +213,7 @@ impl Evaluator {
             let text = expression.text();
             let compared = self.comparisons.iter().filter(|comparison| comparison.bound().text == text);
             let without_data = self.without_data.iter().filter(|verdict| verdict.text == text).cloned();
-            let compared = compared.map(|comparison| comparison.verdict(end, missing));
+            let compared = compared.map(|comparison| comparison.verdict(&self.signals, end, missing));
             let mut of_expression: Vec<Verdict> = compared.chain(without_data).collect();
             if of_expression.is_empty() {
                 of_expression.push(Verdict::no_data(text, None, Reason::NothingReceived));
@@ -223,23 +233,22 @@ fn printed_value(number: Number) -> f64 {
     }
 }
 
-/// Finds the inputs that use a source.
-fn routes(comparisons: &[Comparison], source: &Source) -> Vec<Route> {
-    let mut routes = Vec::new();
-    for (comparison, bound) in comparisons.iter().map(Comparison::bound).enumerate() {
-        for (input, known) in bound.inputs.iter().enumerate() {
-            if known.node != source.node || *known.name != *source.signal {
-                continue;
-            }
-            let unit = match (unit_of(source), known.unit) {
-                // If the unit was unknown when the expression was bound, the value is not converted.
-                (_, None) => UnitChange::Unchanged,
-                (now, then) if now == then => UnitChange::Unchanged,
-                (Some(now), Some(then)) if now.convert(0.0, then).is_some() => UnitChange::Convertible(now, then),
-                _ => UnitChange::Incompatible,
-            };
-            routes.push(Route { comparison, input, unit });
-        }
-    }
-    routes
+/// Finds the signals of expressions that a source delivers, and the inputs with these signals.
+fn routes(comparisons: &[Comparison], signals: &SharedSignals, source: &Source) -> Vec<Route> {
+    let own = signals.all().filter(|(_, known)| known.node == source.node && *known.name == *source.signal);
+    own.map(|(signal, known)| {
+        let unit = match (unit_of(source), known.unit) {
+            // If the unit was unknown when the expression was bound, the value is not converted.
+            (_, None) => UnitChange::Unchanged,
+            (now, then) if now == then => UnitChange::Unchanged,
+            (Some(now), Some(then)) if now.convert(0.0, then).is_some() => UnitChange::Convertible(now, then),
+            _ => UnitChange::Incompatible,
+        };
+        let inputs = comparisons.iter().enumerate().flat_map(|(comparison, it)| {
+            let places = it.places().iter().enumerate().filter(move |(_, place)| **place == signal);
+            places.map(move |(input, _)| (comparison, input))
+        });
+        Route { signal, unit, inputs: inputs.collect() }
+    })
+    .collect()
 }

@@ -54,6 +54,51 @@ impl Formula {
         value.is_finite().then_some(value)
     }
 
+    /// The formula with the number 0 for all inputs. For formulas with one input.
+    pub(super) fn of_first_input(&self) -> Formula {
+        let inner = |formula: &Formula| Box::new(formula.of_first_input());
+        match self {
+            Formula::Input(_) => Formula::Input(0),
+            Formula::Number(_) | Formula::Aggregate(_) => self.clone(),
+            Formula::Negative(of) => Formula::Negative(inner(of)),
+            Formula::Absolute(of) => Formula::Absolute(inner(of)),
+            Formula::Arithmetic(first, operator, second) => Formula::Arithmetic(inner(first), *operator, inner(second)),
+            Formula::Converted(of, from, to, offsets) => Formula::Converted(inner(of), *from, *to, *offsets),
+        }
+    }
+
+    /// The formula with its constant part calculated. Called once, for formulas that are evaluated for each sample.
+    fn fold(&mut self) {
+        let is_constant = |formula: &Formula| {
+            let mut inputs = Vec::new();
+            formula.inputs(&mut inputs);
+            inputs.is_empty() && !formula.has_aggregates()
+        };
+        if let Some(number) = self.constant().filter(|_| is_constant(self)) {
+            *self = Formula::Number(number);
+            return;
+        }
+        match self {
+            Formula::Number(_) | Formula::Input(_) | Formula::Aggregate(_) => {}
+            Formula::Negative(inner) | Formula::Absolute(inner) | Formula::Converted(inner, ..) => inner.fold(),
+            Formula::Arithmetic(first, _, second) => {
+                first.fold();
+                second.fold();
+            }
+        }
+    }
+
+    fn has_aggregates(&self) -> bool {
+        match self {
+            Formula::Aggregate(_) => true,
+            Formula::Number(_) | Formula::Input(_) => false,
+            Formula::Negative(inner) | Formula::Absolute(inner) | Formula::Converted(inner, ..) => {
+                inner.has_aggregates()
+            }
+            Formula::Arithmetic(first, _, second) => first.has_aggregates() || second.has_aggregates(),
+        }
+    }
+
     /// The value of a formula without inputs.
     pub(super) fn constant(&self) -> Option<f64> {
         self.value(Values { inputs: &[], aggregates: &[] })
@@ -110,6 +155,16 @@ impl Rule {
             }
             Rule::Not(inner) => !inner.is_satisfied(values)?,
         })
+    }
+
+    /// Calculates the constant parts of its formulas, for example a limit in another unit.
+    pub(super) fn fold(&mut self) {
+        match self {
+            Rule::Compare(first, _, second, _) => [first, second].into_iter().for_each(Formula::fold),
+            Rule::Within(value, low, high, _) => [value, low, high].into_iter().for_each(Formula::fold),
+            Rule::And(first, second) | Rule::Or(first, second) => [first, second].into_iter().for_each(|it| it.fold()),
+            Rule::Not(inner) => inner.fold(),
+        }
     }
 
     /// Adds the inputs of this rule to `inputs`, without repetitions.

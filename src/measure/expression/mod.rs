@@ -23,6 +23,7 @@ pub mod evaluator;
 mod formula;
 mod lex;
 mod parse;
+mod series;
 #[cfg(test)]
 mod tests;
 pub mod tree;

@@ -1,3 +1,5 @@
+mod shared;
+
 use super::bind::AvailableSignals;
 use super::evaluator::Evaluator;
 use super::tree::{Condition, Function, Operator, Position, Quantity, Relation, SignalName};
