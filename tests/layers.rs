@@ -76,6 +76,7 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("indicatif", &["output"]),
     ("noto_sans_mono_bitmap", &["output"]),
     ("libc", &["bus"]),
+    ("ryu", &["output"]),
     ("serde_json", &["output", "publish"]),
     ("signal_hook", &["bus"]),
     ("socket2", &["bus"]),

@@ -14,6 +14,7 @@ mod python_can;
 mod tests;
 mod text;
 mod trc;
+mod wanted;
 
 use super::memory::Sleeper;
 use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
@@ -26,6 +27,7 @@ use std::io;
 use std::mem;
 use std::time::{Duration, Instant};
 use text::FrameOrFault;
+use wanted::Wanted;
 
 /// A file is not a recording after this many lines of unknown format.
 const MAX_UNKNOWN: u64 = 100;
@@ -129,7 +131,7 @@ pub struct Replay {
     /// The next event.
     next: Option<(Stamp, Event)>,
     state: State,
-    filters: Filters,
+    wanted: Wanted,
     /// The start of a replay in real time, and the wait function.
     pace: Option<(Instant, Box<dyn Sleeper>)>,
     /// Whether any line was a frame.
@@ -193,7 +195,7 @@ impl Replay {
             now: Mono::START,
             next: None,
             state: State::Reading,
-            filters: Filters::All,
+            wanted: Wanted::All,
             pace: None,
             is_recording: false,
             skipped: None,
@@ -267,6 +269,11 @@ impl Replay {
     }
 
     fn read(&mut self, number: u64, bytes: &[u8]) -> Result<(), BusError> {
+        if let (Some((RecordingFormat::Candump, _)), Some((wall, channel, frame))) =
+            (&self.format, candump::fixed_line(bytes))
+        {
+            return self.take(number, wall, channel, Ok(frame));
+        }
         let text = text_of(bytes);
         let text = text.trim();
         let is_cut = self.lines.is_cut;
@@ -336,7 +343,7 @@ impl Replay {
         let is_wanted = self.channel.as_deref().is_none_or(|chosen| chosen == channel);
         self.next = match event {
             _ if !is_wanted => None,
-            Ok(frame) if !self.filters.wants(&frame) => None,
+            Ok(frame) if !self.wanted.has(frame.id()) => None,
             Ok(frame) => Some((at, Event::Frame(Received { frame, at }))),
             Err(fault) => Some((at, Event::Fault(fault, at))),
         };
@@ -450,9 +457,9 @@ impl Bus for Replay {
     }
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.filters = filters.clone();
+        self.wanted = Wanted::new(filters);
         if let Some((_, Event::Frame(Received { frame, .. }))) = &self.next
-            && !self.filters.wants(frame)
+            && !self.wanted.has(frame.id())
         {
             self.next = None;
         }

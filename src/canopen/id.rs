@@ -3,7 +3,9 @@
 //! The predefined connection set is that of CiA 301, 7.3.3: function code in bits 10 to 7, node-ID in bits 6 to 0. The
 //! LSS identifiers are those of CiA 305.
 
+use std::collections::HashMap;
 use std::fmt;
+use std::hash::{BuildHasherDefault, Hasher};
 use std::str::FromStr;
 
 /// A CANopen node-ID, 1 to 127 (CiA 301, 7.3.3). 0 addresses all nodes and is not a node-ID.
@@ -161,6 +163,40 @@ impl CanId {
                 0x000..=0x07f | 0x101..=0x180 | 0x581..=0x5ff | 0x601..=0x67f | 0x6e0..=0x6ff | 0x701..=0x7ff
             ),
         }
+    }
+}
+
+/// A hash map by identifier, for keys that the program chooses: frames from the bus are only looked up.
+pub type CanIdMap<V> = HashMap<CanId, V, BuildHasherDefault<CanIdHasher>>;
+
+/// A hash of an identifier in a few instructions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CanIdHasher(u64);
+
+impl Hasher for CanIdHasher {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_u64(byte.into()));
+    }
+
+    fn write_u16(&mut self, number: u16) {
+        self.write_u64(number.into());
+    }
+
+    fn write_u32(&mut self, number: u32) {
+        self.write_u64(number.into());
+    }
+
+    fn write_u64(&mut self, number: u64) {
+        self.0 = (self.0.rotate_left(32) ^ number).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    /// The width of the identifier.
+    fn write_isize(&mut self, number: isize) {
+        self.write_u64(u64::from(number != 0));
+    }
+
+    fn finish(&self) -> u64 {
+        self.0 ^ self.0 >> 32
     }
 }
 

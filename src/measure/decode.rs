@@ -4,12 +4,12 @@ use super::layout::{Layout, Signal, Tpdo, fits};
 pub use super::reading::{Reading, is_smallest};
 use super::sample::{Sample, Source};
 use crate::bus::Received;
-use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::id::{CanId, CanIdMap, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{Field, TpdoNumber, lay_out};
 use crate::canopen::value::DataType;
 use crate::device::unit::Unit;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// A requested value of a node.
@@ -111,7 +111,7 @@ impl TpdoDecoder {
 /// Decodes the TPDOs of several nodes.
 #[derive(Debug, Default)]
 pub struct Decoder {
-    tpdos: HashMap<CanId, TpdoDecoder>,
+    tpdos: CanIdMap<TpdoDecoder>,
     sources: Vec<Source>,
     /// COB-IDs of two TPDOs that were not reported yet.
     shared: BTreeMap<CanId, [(NodeId, TpdoNumber); 2]>,

@@ -4,7 +4,7 @@ use crate::bus::Mono;
 use std::time::Duration;
 
 /// Without `--max-gap`, an interval longer than this many usual intervals is a gap.
-const GAP_FACTOR: u32 = 3;
+const GAP_FACTOR: u64 = 3;
 
 /// A sender is silent after this many usual intervals.
 const SILENCE_FACTOR: u32 = 5;
@@ -16,7 +16,12 @@ const MIN_SILENCE: Duration = Duration::from_secs(1);
 #[derive(Clone, Debug, Default)]
 pub struct IntervalTracker {
     last: Option<Mono>,
-    usual: Option<Duration>,
+    /// In nanoseconds: every frame of a recording changes it.
+    usual: Option<u64>,
+}
+
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }
 
 impl IntervalTracker {
@@ -25,13 +30,16 @@ impl IntervalTracker {
     pub fn add(&mut self, now: Mono, max_gap: Option<Duration>) -> Option<Duration> {
         let mut gap = None;
         if let Some(last) = self.last.filter(|&last| last < now) {
-            let interval = now.since(last);
-            let longest = max_gap.or(self.usual.map(|usual| usual * GAP_FACTOR));
-            gap = longest.filter(|&longest| interval > longest).map(|_| interval);
+            let interval = nanoseconds(now.since(last));
+            let longest = max_gap.map(nanoseconds).or(self.usual.map(|usual| usual.saturating_mul(GAP_FACTOR)));
+            gap = longest.filter(|&longest| interval > longest).map(|_| Duration::from_nanos(interval));
             // For the average, an interval is limited to three usual intervals. So one gap does not hide the next gap.
             // If a sender becomes slower, the average follows within a few messages.
             self.usual = Some(match self.usual {
-                Some(usual) => (usual * 7 + interval.min(usual * GAP_FACTOR)) / 8,
+                Some(usual) => {
+                    let interval = interval.min(usual.saturating_mul(GAP_FACTOR));
+                    usual.saturating_mul(7).saturating_add(interval) / 8
+                }
                 None => interval,
             });
         }
@@ -41,7 +49,7 @@ impl IntervalTracker {
 
     /// The usual interval; `None` before the second message.
     pub fn usual(&self) -> Option<Duration> {
-        self.usual
+        self.usual.map(Duration::from_nanos)
     }
 
     /// Whether a message was received so far.
@@ -51,7 +59,7 @@ impl IntervalTracker {
 
     /// The time since the last message, if it is longer than usual.
     pub fn silence(&self, now: Mono) -> Option<Duration> {
-        let limit = (self.usual.unwrap_or_default() * SILENCE_FACTOR).max(MIN_SILENCE);
+        let limit = (self.usual().unwrap_or_default() * SILENCE_FACTOR).max(MIN_SILENCE);
         self.last.map(|last| now.since(last)).filter(|&silence| silence > limit)
     }
 

@@ -22,6 +22,8 @@ pub(super) const REDRAWS_PER_SECOND: u8 = 10;
 #[derive(Debug)]
 pub struct Progress {
     multi: MultiProgress,
+    /// Whether nothing is shown. Asked for each frame.
+    is_hidden: bool,
     /// All lines in one bar. They are then drawn together.
     lines: ProgressBar,
     table: LiveTable,
@@ -45,7 +47,8 @@ impl Progress {
         lines.set_style(style("{msg}"));
         let color = has_color(color);
         let (table, drawn) = (LiveTable::default(), (0, Vec::new()));
-        Progress { multi, lines, table, color, drawn, second: (Duration::ZERO, 0), rows_per_second: 0.0 }
+        let is_hidden = multi.is_hidden();
+        Progress { multi, is_hidden, lines, table, color, drawn, second: (Duration::ZERO, 0), rows_per_second: 0.0 }
     }
 
     /// Returns the [`MultiProgress`]: the console prints its lines between the redraws.
@@ -55,7 +58,7 @@ impl Progress {
 
     /// Whether nothing is shown.
     pub fn is_hidden(&self) -> bool {
-        self.multi.is_hidden()
+        self.is_hidden
     }
 
     /// Stores the latest values for the next redraw.
@@ -103,6 +106,7 @@ impl Progress {
             let _ = self.multi.clear();
         }
         self.multi.set_draw_target(ProgressDrawTarget::hidden());
+        self.is_hidden = true;
     }
 }
 

@@ -7,7 +7,12 @@
 use super::text::{ERROR_FRAME, FrameOrFault, TimeZone, digits, fault, number};
 use super::{Line, Parser};
 use crate::bus::Wall;
+use crate::canopen::frame::Frame;
+use crate::canopen::id::CanId;
 use std::time::Duration;
+
+/// More digits of the seconds are left to the parser, which checks the year.
+const MAX_SECONDS_DIGITS: usize = 10;
 
 pub(super) struct Candump {
     zone: TimeZone,
@@ -29,6 +34,50 @@ impl Parser for Candump {
         let (Some(interface), Some(frame)) = (words.next(), words.next()) else { return Line::Unknown };
         let event = if frame.contains('#') { log_frame(frame) } else { screen_frame(rest) };
         Line::at(wall, interface, event)
+    }
+}
+
+/// A line as `candump -L` writes it, `(1436509053.249713) can0 123#1122`, with a data frame with an 11-bit identifier.
+/// `None` for every other line: the parser reads it. Most recordings have millions of such lines.
+pub(super) fn fixed_line(line: &[u8]) -> Option<(Wall, &str, Frame)> {
+    let line = line.strip_prefix(b"(")?.strip_suffix(b"\n")?;
+    let (seconds, line) = split_at_byte(line, b'.')?;
+    let (micros, line) = line.split_first_chunk::<6>()?;
+    let (channel, frame) = split_at_byte(line.strip_prefix(b") ")?, b' ')?;
+    let (id, data) = split_at_byte(frame, b'#')?;
+    let ([_, _, _], 0..=MAX_SECONDS_DIGITS, 0..=16) = (id, seconds.len(), data.len()) else { return None };
+    let id = id.iter().try_fold(0u16, |id, &digit| Some(id << 4 | u16::from(hex_digit(digit)?)))?;
+    let mut bytes = [0; 8];
+    let (pairs, []) = data.as_chunks::<2>() else { return None };
+    for (byte, &[high, low]) in bytes.iter_mut().zip(pairs) {
+        *byte = hex_digit(high)? << 4 | hex_digit(low)?;
+    }
+    let frame = Frame::new(CanId::standard(id)?, &bytes[..pairs.len()]).ok()?;
+    let is_name = !channel.is_empty() && channel.iter().all(u8::is_ascii_graphic);
+    let channel = std::str::from_utf8(channel).ok().filter(|_| is_name)?;
+    let nanoseconds = u32::try_from(decimal(micros)?).ok()? * 1000;
+    Some((Wall::at(Duration::new(decimal(seconds)?, nanoseconds)), channel, frame))
+}
+
+/// The bytes before and after the first `byte`.
+fn split_at_byte(bytes: &[u8], byte: u8) -> Option<(&[u8], &[u8])> {
+    let at = bytes.iter().position(|&it| it == byte)?;
+    Some((&bytes[..at], &bytes[at + 1..]))
+}
+
+/// A number of at least one digit.
+fn decimal(digits: &[u8]) -> Option<u64> {
+    let digit = |byte: u8| Some(byte.wrapping_sub(b'0')).filter(|digit| *digit < 10);
+    let number = digits.iter().try_fold(0u64, |number, &byte| Some(number * 10 + u64::from(digit(byte)?)));
+    number.filter(|_| !digits.is_empty())
+}
+
+fn hex_digit(byte: u8) -> Option<u8> {
+    match byte {
+        b'0'..=b'9' => Some(byte - b'0'),
+        b'A'..=b'F' => Some(byte - b'A' + 10),
+        b'a'..=b'f' => Some(byte - b'a' + 10),
+        _ => None,
     }
 }
 
@@ -124,6 +173,7 @@ mod tests {
     use super::super::text::test_zone;
     use super::*;
     use crate::bus::Fault;
+    use proptest::prelude::*;
 
     fn parse(text: &str) -> Line<'_> {
         Candump::new(test_zone).line(text)
@@ -151,6 +201,28 @@ mod tests {
         let text = "(2000-01-02 00:00:01.500000)  vcan1  00000123   [0]  remote request";
         assert_eq!(frame(text), Some((Duration::new(86_401, 500_000_000), "vcan1 00000123#R".to_owned())));
         assert_eq!(frame("(1.5) can0  080   [0]").map(|(_, frame)| frame), Some("can0 080#".to_owned()));
+    }
+
+    proptest! {
+        /// A line is read in the fixed form only if the parser reads it, with the same result.
+        #[test]
+        fn fixed_form_agrees_with_the_parser(
+            text in r"\(?[0-9]{0,11}[.][0-9]{5,7}\) ?[a-z0-9]{0,5} [0-9A-Fa-f]{2,4}#{1,2}[0-9A-FR]{0,18} ?R?",
+            end in "[ \r]?\n?",
+        ) {
+            let line = text.clone() + &end;
+            if let Some((wall, channel, frame)) = fixed_line(line.as_bytes()) {
+                prop_assert_eq!(parse(line.trim()), Line::Event(wall, channel, Ok(frame)));
+            }
+        }
+
+        #[test]
+        fn candump_writes_the_fixed_form(seconds in 0u64..9_999_999_999, micros in 0u32..1_000_000, id in 0u16..0x800, data: [u8; 8], length in 0usize..=8) {
+            let frame = Frame::new(CanId::standard(id).expect("11 bits"), &data[..length]).expect("8 bytes");
+            let line = format!("({seconds:010}.{micros:06}) can0 {frame}\n");
+            let wall = Wall::at(Duration::new(seconds, micros * 1000));
+            prop_assert_eq!(fixed_line(line.as_bytes()), Some((wall, "can0", frame)));
+        }
     }
 
     #[test]

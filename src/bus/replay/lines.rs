@@ -9,6 +9,9 @@ use std::io::{self, BufRead, BufReader, Cursor, Read};
 /// The longest line in bytes. The rest of a longer line is ignored.
 const MAX_LINE: u64 = 4096;
 
+/// The size of the read buffer in bytes.
+const BUFFER_SIZE: usize = 1 << 16;
+
 /// The first bytes of a file, which show its format.
 const START_LENGTH: u64 = 16;
 
@@ -16,7 +19,7 @@ const START_LENGTH: u64 = 16;
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 pub(super) struct Lines {
-    reader: Box<dyn BufRead>,
+    reader: BufReader<Box<dyn Read>>,
     /// The first bytes, after decompression.
     pub(super) start: Vec<u8>,
     /// Lines that were read ahead, with their numbers.
@@ -33,14 +36,15 @@ impl Lines {
         if file == "-" {
             return Lines::new(Box::new(BufReader::new(io::stdin())));
         }
-        Lines::new(Box::new(BufReader::with_capacity(1 << 16, File::open(file)?)))
+        Lines::new(Box::new(BufReader::with_capacity(BUFFER_SIZE, File::open(file)?)))
     }
 
     pub(super) fn new(reader: Box<dyn BufRead>) -> io::Result<Lines> {
         let (mut start, mut reader) = first_bytes(reader)?;
         let mut is_cut = false;
         if start.starts_with(GZIP) {
-            let unpacked: Box<dyn BufRead> = Box::new(BufReader::with_capacity(1 << 16, MultiGzDecoder::new(reader)));
+            let unpacked: Box<dyn BufRead> =
+                Box::new(BufReader::with_capacity(BUFFER_SIZE, MultiGzDecoder::new(reader)));
             (start, reader) = match first_bytes(unpacked) {
                 Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
                     is_cut = true;
@@ -53,6 +57,7 @@ impl Lines {
             start = rest.to_vec();
             reader.consume(BYTE_ORDER_MARK.len());
         }
+        let reader = BufReader::with_capacity(BUFFER_SIZE, reader as Box<dyn Read>);
         Ok(Lines { reader, start, ahead: VecDeque::new(), number: 0, is_cut })
     }
 
@@ -103,7 +108,7 @@ impl Lines {
         match (&mut self.reader).take(MAX_LINE).read_until(b'\n', part) {
             Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
                 self.is_cut = true;
-                self.reader = Box::new(io::empty());
+                self.reader = BufReader::new(Box::new(io::empty()));
                 Ok(part.len())
             }
             read => read,

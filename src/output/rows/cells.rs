@@ -150,6 +150,7 @@ pub(super) fn push_value(out: &mut Vec<u8>, value: Option<Number>, decimal: u8) 
                 push_padded(out, size % power, usize::from(digits));
             }
         }
+        Some(Number::Real32(real)) if push_short_real(out, real, decimal) => {}
         Some(number) => {
             let begin = out.len();
             write!(out, "{number}")?;
@@ -159,6 +160,29 @@ pub(super) fn push_value(out: &mut Vec<u8>, value: Option<Number>, decimal: u8) 
         }
     }
     Ok(())
+}
+
+/// Writes a REAL32 as its `Display` does, the shortest text that parses to the same number, but faster. Returns `false`
+/// without writing if the number is very small or large, or if two texts are equally near.
+fn push_short_real(out: &mut Vec<u8>, real: f32, decimal: u8) -> bool {
+    if !(1e-4..1e12).contains(&real.abs()) {
+        return false;
+    }
+    let mut buffer = ryu::Buffer::new();
+    let text = buffer.format_finite(real);
+    let text = text.strip_suffix(".0").unwrap_or(text);
+    let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
+    // `ryu` rounds half of the last digit to an even digit, `Display` rounds it up. The product is exact.
+    let halves = f64::from(real.abs()) * 10f64.powi(i32::try_from(fraction.len()).unwrap_or(i32::MAX)) * 2.0;
+    if halves % 2.0 == 1.0 {
+        return false;
+    }
+    out.extend_from_slice(whole.as_bytes());
+    if !fraction.is_empty() {
+        out.push(decimal);
+        out.extend_from_slice(fraction.as_bytes());
+    }
+    true
 }
 
 /// Bytes in wire order, after `0x`.
@@ -258,6 +282,17 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn reals_match_their_display(single: u32, double: u64, near in -1e13f64..1e13) {
+            let halves = (near * 1e-6).trunc() / 8.0;
+            for real in [f32::from_bits(single), near as f32, (near * 1e-10) as f32, near.trunc() as f32, halves as f32] {
+                prop_assert_eq!(value(Number::Real32(real), b'.'), Number::Real32(real).to_string());
+            }
+            for real in [f64::from_bits(double), near] {
+                prop_assert_eq!(value(Number::Real64(real), b'.'), Number::Real64(real).to_string());
+            }
+        }
+
         #[test]
         fn numbers_and_times_match_their_display(
             mantissa in any::<i128>(), small in any::<i64>(), digits in 0u8..=38, since in 0u64..250_000_000_000_000_000,
