@@ -11,7 +11,7 @@ use crate::output::failure::ErrorMessage;
 use crate::output::interfaces::{BitRateReport, Interface, change, tried_line};
 use crate::output::progress::Activity;
 use crate::tasks::Failure;
-use crate::tasks::detect::{By, DetectFailure, How, detect};
+use crate::tasks::detect::{DetectFailure, Evidence, Method, detect};
 use clap::{Args, Subcommand};
 
 /// List CAN interfaces, bring them up and down, and find the bit rate of a bus
@@ -129,7 +129,7 @@ impl Detect {
         let mut is_asking = false;
         let activity = Activity::new(global.shows_progress(), "trying bit rates");
         let detection = detect(&mut *bus, self.active, self.time_per_rate.0, &mut |tried| {
-            if tried.how == How::Asking && !std::mem::replace(&mut is_asking, true) {
+            if tried.how == Method::Asking && !std::mem::replace(&mut is_asking, true) {
                 let text = "no valid frame; now sending requests, which disturbs nodes at other bit rates";
                 activity.above(|| console.note(text));
             }
@@ -147,7 +147,7 @@ impl Detect {
             return Err(Failure::general(DetectFailure::NotFound { interface, detection, active: self.active }).into());
         };
         global.print(std::slice::from_ref(&report))?;
-        if by == By::Acknowledge {
+        if by == Evidence::Acknowledge {
             console.warn("requests were acknowledged only at this bit rate, but no node answered");
         }
         Ok(())

@@ -305,10 +305,10 @@ impl WriteArgs {
             for (at, bytes, data_type) in ready {
                 let is_verifiable = self.verify && !is_signature(&bytes);
                 let verify = is_verifiable.then_some(data_type);
-                if let Written::ReadBack(heard) = write(master, &node, at, &bytes, verify, &mut options)? {
-                    let heard = heard.map(|frame| format!("; heard {frame}")).unwrap_or_default();
+                if let Written::ReadBack(received) = write(master, &node, at, &bytes, verify, &mut options)? {
+                    let received = received.map(|frame| format!("; received {frame}")).unwrap_or_default();
                     let message =
-                        format!("node {}: no answer to {at}{heard}; it was read back and has the value", self.node);
+                        format!("node {}: no answer to {at}{received}; it was read back and has the value", self.node);
                     global.console().note(&message);
                 }
                 if self.verify && !is_verifiable {

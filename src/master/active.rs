@@ -20,7 +20,7 @@ const SLOWEST_BYTE: Duration = Duration::from_millis(30);
 
 /// A transfer in progress.
 #[derive(Debug)]
-pub(super) struct Active {
+pub(super) struct ActiveTransfer {
     pub(super) ticket: Ticket,
     pub(super) request: Request,
     pub(super) machine: Machine,
@@ -48,7 +48,7 @@ pub(super) struct Active {
     pub(super) is_repeated: bool,
 }
 
-/// The result of [`Active::check_length`].
+/// The result of [`ActiveTransfer::check_length`].
 pub(super) enum LengthCheck {
     /// The bytes are the answer.
     Accepted,
@@ -58,15 +58,15 @@ pub(super) enum LengthCheck {
     WrongLength,
 }
 
-impl Active {
-    pub(super) fn new(ticket: Ticket, request: Request, accept_60: bool, timing: &Timing) -> Active {
+impl ActiveTransfer {
+    pub(super) fn new(ticket: Ticket, request: Request, accept_60: bool, timing: &Timing) -> ActiveTransfer {
         // If the server does not answer a block request, the next request is a segmented one, not a retry.
         let attempts = if request.falls_back() { 0 } else { timing.retries };
         let attempts_left = if request.repeatable { attempts } else { 0 };
         let machine = request.machine(accept_60);
         let (deadline, asked_at, begun_at, deferred) = (None, None, None, None);
         let foreign = ForeignTraffic::default();
-        Active {
+        ActiveTransfer {
             ticket,
             restarts_left: if request.may_restart() { timing.retries } else { 0 },
             was_rejected: false,

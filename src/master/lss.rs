@@ -79,13 +79,13 @@ pub struct Lss<'master, 'bus> {
     boot_ups: BTreeMap<NodeId, Stamp>,
     faults: Vec<Fault>,
     /// The first frame of a slave that did not answer the request.
-    heard: Option<Frame>,
+    received: Option<Frame>,
 }
 
 impl<'bus> Master<'bus> {
     /// The LSS services.
     pub fn lss(&mut self) -> Lss<'_, 'bus> {
-        Lss { master: self, is_configuring: false, boot_ups: BTreeMap::new(), faults: Vec::new(), heard: None }
+        Lss { master: self, is_configuring: false, boot_ups: BTreeMap::new(), faults: Vec::new(), received: None }
     }
 }
 
@@ -317,7 +317,7 @@ impl<'bus> Lss<'_, 'bus> {
         let service = exchange.service();
         match error {
             ExchangeError::NoAnswer => {
-                LssError::NoAnswer { service, waited: self.timeout_of(exchange), heard: self.heard }
+                LssError::NoAnswer { service, waited: self.timeout_of(exchange), received: self.received }
             }
             ExchangeError::Several(frames) => LssError::Several { service, frames },
             ExchangeError::Refused(code) => LssError::Refused { service, code },
@@ -341,7 +341,7 @@ impl<'bus> Lss<'_, 'bus> {
         // Frames received before the request do not answer it.
         self.discard_received()?;
         self.faults.clear();
-        self.heard = None;
+        self.received = None;
         for attempt in 0..=retries {
             // If only the answer was lost, the slave is in configuration state and ignores the address.
             if attempt > 0 && exchange.service() == Service::SwitchSelective {
@@ -359,7 +359,7 @@ impl<'bus> Lss<'_, 'bus> {
             while let Some(received) = self.next(deadline)? {
                 let is_first = !exchange.has_answer();
                 if !exchange.on_frame(&received.frame) {
-                    self.heard.get_or_insert(received.frame);
+                    self.received.get_or_insert(received.frame);
                 } else if is_first && until == Until::Answer {
                     deadline = deadline.min(received.at.mono + FURTHER_ANSWERS_TIMEOUT);
                 }

@@ -6,12 +6,12 @@
 
 mod active;
 mod foreign_traffic;
-mod heard;
 pub mod lss;
 mod machine;
 mod missed_answer;
 mod parallel;
 mod raw;
+mod receive_times;
 mod request;
 mod sdo;
 mod second_answer;

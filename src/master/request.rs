@@ -273,9 +273,9 @@ fn two_devices(answers: Option<&SecondAnswer>) -> String {
 
 /// Describes the frames that were received instead of an answer.
 fn received(missed: &MissedAnswer) -> String {
-    let heard = missed.frame.map(|frame| format!("; heard {frame}")).unwrap_or_default();
+    let received = missed.frame.map(|frame| format!("; received {frame}")).unwrap_or_default();
     let state = missed.state.map(|state| format!("; its heartbeat shows {state}")).unwrap_or_default();
-    format!("{heard}{state}")
+    format!("{received}{state}")
 }
 
 impl Answer {

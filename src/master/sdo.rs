@@ -5,9 +5,9 @@
 mod receive;
 
 use super::Timing;
-use super::active::Active;
-use super::heard::Heard;
+use super::active::ActiveTransfer;
 use super::missed_answer::MissedAnswers;
+use super::receive_times::ReceiveTimes;
 use super::request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 use super::second_answer::{Answers, OnTwoDevices, SecondAnswer};
 use super::send::Outgoing;
@@ -30,7 +30,7 @@ struct StaleRequest {
 #[derive(Debug, Default)]
 struct Node {
     waiting: VecDeque<(Ticket, Request)>,
-    active: Option<Active>,
+    active: Option<ActiveTransfer>,
     stale: Vec<StaleRequest>,
     answers: Answers,
     /// Whether a write was acknowledged.
@@ -59,7 +59,7 @@ pub(super) struct SdoClient {
     can_start: bool,
     pub(super) on_two_devices: OnTwoDevices,
     pub(super) missed_answers: MissedAnswers,
-    pub(super) heard: Heard,
+    pub(super) receive_times: ReceiveTimes,
     /// The length of the first heartbeat of each node whose length is not one byte.
     unusual_heartbeats: BTreeMap<NodeId, usize>,
 }
@@ -137,9 +137,12 @@ impl SdoClient {
             let mut active = if has_stale_request {
                 let other = node.barrier(request.object);
                 let barrier = Request::read(request.node, other).with_timing_of(&request);
-                Active { deferred: Some((ticket, request)), ..Active::new(ticket, barrier, node.accept_60, timing) }
+                ActiveTransfer {
+                    deferred: Some((ticket, request)),
+                    ..ActiveTransfer::new(ticket, barrier, node.accept_60, timing)
+                }
             } else {
-                Active::new(ticket, request, node.accept_60, timing)
+                ActiveTransfer::new(ticket, request, node.accept_60, timing)
             };
             active.enqueue(vec![active.machine.request()], outgoing);
             node.active = Some(active);
@@ -154,7 +157,7 @@ impl SdoClient {
             active.machine.on_sent();
             if active.asked_at.replace(active.asked_at.unwrap_or(before)).is_none() {
                 self.missed_answers.on_request(ticket.node, active.request.object);
-                self.heard.on_request(ticket.node, before);
+                self.receive_times.on_request(ticket.node, before);
             }
             active.unsent = active.unsent.saturating_sub(1);
             if active.unsent == 0 {
@@ -208,7 +211,7 @@ impl SdoClient {
     /// Handles a received frame; `false` if it does not belong to one of our transfers.
     pub(super) fn on_frame(&mut self, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let id = received.frame.id();
-        self.heard.on_frame(received);
+        self.receive_times.on_frame(received);
         let known = id.sdo_response_node().or_else(|| id.sdo_request_node());
         let Some(number) = known.filter(|node| self.nodes.contains_key(node)) else {
             self.missed_answers.on_other_cob_id(&received.frame, received.at.mono);

@@ -20,7 +20,7 @@ pub enum Error {
     /// A write was sent but not acknowledged, and it is unknown whether the node executed the write.
     Unknown(SdoError),
     /// An object was written, but has a different value when read back.
-    NotKept {
+    ReadBackDiffers {
         /// The node.
         node: NodeId,
         /// The object.

@@ -129,7 +129,7 @@ pub fn write_with(
             _ if error.operation == Operation::Read => return Err(error.into()),
             _ if !may_be_lost(&error) => return Err(Error::Unknown(error)),
             _ => match read_back(master, node, object, data, options)? {
-                Some(true) => return Ok(Written::ReadBack(heard(&error))),
+                Some(true) => return Ok(Written::ReadBack(frame_instead_of_answer(&error))),
                 Some(false) if options.repeat == Repeat::Once && attempts_left > 0 => attempts_left -= 1,
                 Some(false) => return Err(error.into()),
                 None => return Err(Error::Unknown(error)),
@@ -141,7 +141,7 @@ pub fn write_with(
 /// Writes a value and reads it back.
 ///
 /// # Errors
-/// As [`write()`]; [`Error::NotKept`] if the object has a different value.
+/// As [`write()`]; [`Error::ReadBackDiffers`] if the object has a different value.
 pub fn write_and_verify(
     master: &mut Master<'_>,
     node: &Node,
@@ -157,7 +157,7 @@ pub fn write_and_verify(
 /// Reads an object and compares it with the written bytes.
 ///
 /// # Errors
-/// The read failed; [`Error::NotKept`] if the object has a different value.
+/// The read failed; [`Error::ReadBackDiffers`] if the object has a different value.
 pub fn verify(
     master: &mut Master<'_>,
     node: &Node,
@@ -167,7 +167,7 @@ pub fn verify(
 ) -> Result<(), Error> {
     let found = master.read(node.id, object, data_type)??;
     let written = shown(data, data_type);
-    if found == written { Ok(()) } else { Err(Error::NotKept { node: node.id, object, written, found }) }
+    if found == written { Ok(()) } else { Err(Error::ReadBackDiffers { node: node.id, object, written, found }) }
 }
 
 /// Whether these bytes are a signature: "save", "load", "zero", "tara", or a number with "set".
@@ -264,7 +264,7 @@ fn read_back(
 }
 
 /// The frame that was received instead of the answer.
-fn heard(error: &SdoError) -> Option<Frame> {
+fn frame_instead_of_answer(error: &SdoError) -> Option<Frame> {
     match error.failure {
         SdoFailure::NoAnswer { missed, .. } => missed.frame,
         _ => None,

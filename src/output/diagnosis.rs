@@ -168,11 +168,11 @@ fn not_sent(number: TpdoNumber, when: &str, silence: &Silence) -> String {
         (Running::NotStopped, false) => "the node is not operational, or sends with another COB-ID",
         (Running::Unknown, false) => "the node is not operational, sends with another COB-ID, or has no power or cable",
     };
-    let heard = match unknown.is_empty() {
+    let received = match unknown.is_empty() {
         true => String::new(),
         false => format!(" (frames were received with COB-ID {}, which no TPDO of the node uses)", unknown.join(", ")),
     };
-    format!("{number} is due {when}, and no {number} was received{heard}: {state}")
+    format!("{number} is due {when}, and no {number} was received{received}: {state}")
 }
 
 /// Other possible causes, if the state of the node is unknown.

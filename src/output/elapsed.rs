@@ -19,7 +19,7 @@ pub(super) struct Elapsed {
 
 impl Elapsed {
     /// The elapsed time of a row. Rows come in order of time.
-    pub(super) fn take(&mut self, at: Stamp) -> Duration {
+    pub(super) fn advance(&mut self, at: Stamp) -> Duration {
         let wall_us = micros(at.wall.since_epoch());
         match self.last {
             None => self.start_us = wall_us,
@@ -37,7 +37,7 @@ impl Elapsed {
     }
 
     /// The elapsed time of an event, which may be older than the last row.
-    pub(super) fn look(&self, at: Stamp) -> Duration {
+    pub(super) fn at(&self, at: Stamp) -> Duration {
         let (last_us, last) = self.last.unwrap_or((self.start_us, at.mono));
         let mono_us = micros(at.mono.since(last)) - micros(last.since(at.mono));
         let wall_us = micros(at.wall.since_epoch()) - last_us;
@@ -64,9 +64,9 @@ mod tests {
     fn elapsed_is_the_difference_of_the_row_times() {
         let mut elapsed = Elapsed::default();
         // In the rows, 1.000000999 s and 1.000001001 s are 1.000000 and 1.000001.
-        assert_eq!(elapsed.take(at(0, 1_000_000_999)), Duration::ZERO);
-        assert_eq!(elapsed.take(at(2, 1_000_001_001)), Duration::from_micros(1));
-        assert_eq!(elapsed.take(at(2_000_000, 1_002_000_000)), Duration::from_micros(2000));
+        assert_eq!(elapsed.advance(at(0, 1_000_000_999)), Duration::ZERO);
+        assert_eq!(elapsed.advance(at(2, 1_000_001_001)), Duration::from_micros(1));
+        assert_eq!(elapsed.advance(at(2_000_000, 1_002_000_000)), Duration::from_micros(2000));
     }
 
     #[test]
@@ -74,11 +74,11 @@ mod tests {
         for step in [-3_600_000_000_000i64, -20_000_000, 20_000_000, 3_600_000_000_000] {
             let mut elapsed = Elapsed::default();
             let wall = 1_700_000_000_000_000_000u64;
-            assert_eq!(elapsed.take(at(0, wall)), Duration::ZERO);
-            assert_eq!(elapsed.take(at(100_000_000, wall + 100_000_000)), Duration::from_millis(100));
+            assert_eq!(elapsed.advance(at(0, wall)), Duration::ZERO);
+            assert_eq!(elapsed.advance(at(100_000_000, wall + 100_000_000)), Duration::from_millis(100));
             let set = (wall + 200_000_000).saturating_add_signed(step);
-            assert_eq!(elapsed.take(at(200_000_000, set)), Duration::from_millis(200), "{step}");
-            assert_eq!(elapsed.take(at(300_000_000, set + 100_000_000)), Duration::from_millis(300), "{step}");
+            assert_eq!(elapsed.advance(at(200_000_000, set)), Duration::from_millis(200), "{step}");
+            assert_eq!(elapsed.advance(at(300_000_000, set + 100_000_000)), Duration::from_millis(300), "{step}");
         }
     }
 }

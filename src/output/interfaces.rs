@@ -1,7 +1,7 @@
 //! Text and reports of CAN interfaces and of the search for a bit rate.
 
 use super::report::{Cell, Column, Report};
-use crate::tasks::detect::{By, Detection, How, Tried};
+use crate::tasks::detect::{Detection, Evidence, Method, RateResult};
 use std::io::{self, Write};
 
 /// An interface. A field is `None` if it is unknown or does not apply.
@@ -123,8 +123,8 @@ impl Report for BitRateReport {
     fn cells(&self) -> Vec<Cell> {
         let Detection { found, tried } = &self.detection;
         let by = found.map(|(_, by)| match by {
-            By::Frames => "frames",
-            By::Acknowledge => "acknowledge",
+            Evidence::Frames => "frames",
+            Evidence::Acknowledge => "acknowledge",
         });
         vec![
             self.interface.clone().into(),
@@ -141,8 +141,8 @@ impl Report for BitRateReport {
     }
 }
 
-fn tried_cells(tried: &Tried) -> Vec<Cell> {
-    let is_active = tried.how == How::Asking;
+fn tried_cells(tried: &RateResult) -> Vec<Cell> {
+    let is_active = tried.how == Method::Asking;
     let is_possible = tried.impossible.is_none();
     vec![
         tried.bit_rate.into(),
@@ -155,7 +155,7 @@ fn tried_cells(tried: &Tried) -> Vec<Cell> {
 }
 
 /// One line about a bit rate that was tried.
-pub fn tried_line(tried: &Tried) -> String {
+pub fn tried_line(tried: &RateResult) -> String {
     let counted = |count: u32, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
     let result = match &tried.impossible {
         Some(reason) => format!("the interface cannot be set to it: {reason}"),

@@ -12,7 +12,7 @@ use crate::canopen::value::DataType;
 use crate::master::{Error, Master};
 use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
-use crate::measure::expression::bind::{AvailableSignals, BareLimit};
+use crate::measure::expression::bind::{AvailableSignals, LimitWithoutUnit};
 use crate::measure::expression::evaluator::Evaluator;
 use crate::measure::expression::verdict::{MissingData, Outcome, Reason, Verdict};
 use crate::measure::sample::{Doubt, Sample, Source};
@@ -145,7 +145,7 @@ fn check_reading(
     evaluator.bind(&options.nodes, &available, options.skip_unsupported, &missing)?;
     let all = wanted_targets(&known, &evaluator)?;
     let at = master.bus().now();
-    evaluator.bare_limits().into_iter().for_each(|limit| observer.event(&bare_limit(limit), at));
+    evaluator.limits_without_unit().into_iter().for_each(|limit| observer.event(&limit_without_unit(limit), at));
     let sources: Vec<Source> = all.iter().map(|target| target.source.clone()).collect();
     let asked: Vec<_> = all.iter().flat_map(objects).collect();
     let mut answers = Reader::new(master).read(&asked)?.into_iter();
@@ -175,8 +175,8 @@ fn check_reading(
     Ok(CheckReport { verdicts, started, length, failures, remarks })
 }
 
-fn bare_limit(limit: BareLimit) -> LogEvent {
-    LogEvent::Remark(Remark::BareLimit(limit))
+fn limit_without_unit(limit: LimitWithoutUnit) -> LogEvent {
+    LogEvent::Remark(Remark::LimitWithoutUnit(limit))
 }
 
 /// All signals of these nodes, and the objects that the expressions name.
@@ -280,7 +280,7 @@ pub struct Checker<'a> {
     received: BTreeSet<usize>,
     started: Option<Stamp>,
     /// The reported limits without a unit.
-    bare_limits: Vec<BareLimit>,
+    limits_without_unit: Vec<LimitWithoutUnit>,
     failure: Option<Failure>,
     observer: &'a mut dyn Observer,
 }
@@ -301,7 +301,7 @@ impl<'a> Checker<'a> {
             is_bound: false,
             received: BTreeSet::new(),
             started: None,
-            bare_limits: Vec::new(),
+            limits_without_unit: Vec::new(),
             failure: None,
             observer,
         }
@@ -336,10 +336,10 @@ impl<'a> Checker<'a> {
     }
 
     fn report_bare_limits(&mut self, at: Stamp) {
-        for limit in self.evaluator.bare_limits() {
-            if !self.bare_limits.contains(&limit) {
-                self.bare_limits.push(limit.clone());
-                self.observer.event(&bare_limit(limit), at);
+        for limit in self.evaluator.limits_without_unit() {
+            if !self.limits_without_unit.contains(&limit) {
+                self.limits_without_unit.push(limit.clone());
+                self.observer.event(&limit_without_unit(limit), at);
             }
         }
     }

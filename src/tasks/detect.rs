@@ -31,7 +31,7 @@ const REQUEST_BITS: u64 = 135;
 
 /// How a bit rate was tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum How {
+pub enum Method {
     /// By listening: no frame, no acknowledgement and no error flag was sent.
     Listening,
     /// By reading the device type of each node-ID.
@@ -40,11 +40,11 @@ pub enum How {
 
 /// The result for one bit rate.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Tried {
+pub struct RateResult {
     /// The bit rate in bit/s.
     pub bit_rate: u32,
     /// How the bit rate was tried.
-    pub how: How,
+    pub how: Method,
     /// The valid frames that were received.
     pub frames: u32,
     /// The errors that the controller reported.
@@ -55,9 +55,9 @@ pub struct Tried {
     pub impossible: Option<String>,
 }
 
-impl Tried {
-    fn new(bit_rate: u32, how: How) -> Tried {
-        Tried { bit_rate, how, frames: 0, errors: 0, acknowledged: false, impossible: None }
+impl RateResult {
+    fn new(bit_rate: u32, how: Method) -> RateResult {
+        RateResult { bit_rate, how, frames: 0, errors: 0, acknowledged: false, impossible: None }
     }
 
     /// Whether this is the bit rate of the bus.
@@ -73,7 +73,7 @@ impl Tried {
 
 /// The evidence for a bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum By {
+pub enum Evidence {
     /// Valid frames.
     Frames,
     /// Requests were acknowledged only at this bit rate, but no node answered.
@@ -84,9 +84,9 @@ pub enum By {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Detection {
     /// The bit rate of the bus in bit/s and its evidence; `None` if it was not found.
-    pub found: Option<(u32, By)>,
+    pub found: Option<(u32, Evidence)>,
     /// The bit rates that were tried, in this order.
-    pub tried: Vec<Tried>,
+    pub tried: Vec<RateResult>,
 }
 
 /// Tries the usual bit rates, the present one first, each for `time_per_rate`. Then restores the interface.
@@ -101,7 +101,7 @@ pub fn detect(
     bus: &mut dyn Bus,
     ask: bool,
     time_per_rate: Duration,
-    on_tried: &mut dyn FnMut(&Tried),
+    on_tried: &mut dyn FnMut(&RateResult),
 ) -> Result<Detection, Failure> {
     bus.can_set_bit_rate().map_err(|error| refused(error, bus.name()))?;
     let bit_rate = bus.bit_rate();
@@ -134,11 +134,11 @@ fn try_all(
     bus: &mut dyn Bus,
     ask: bool,
     time_per_rate: Duration,
-    on_tried: &mut dyn FnMut(&Tried),
+    on_tried: &mut dyn FnMut(&RateResult),
 ) -> Result<Detection, Error> {
     let first = bus.bit_rate();
     let rates: Vec<u32> = first.into_iter().chain(RATES.into_iter().filter(|&rate| Some(rate) != first)).collect();
-    let mut tried: Vec<Tried> = Vec::new();
+    let mut tried: Vec<RateResult> = Vec::new();
     for &bit_rate in &rates {
         let one = match listen(bus, bit_rate, time_per_rate) {
             // Without a listen-only mode, only requests can be tried.
@@ -149,7 +149,7 @@ fn try_all(
         let found = one.is_found();
         tried.push(one);
         if found {
-            return Ok(Detection { found: Some((bit_rate, By::Frames)), tried });
+            return Ok(Detection { found: Some((bit_rate, Evidence::Frames)), tried });
         }
     }
     for &bit_rate in rates.iter().filter(|_| ask) {
@@ -158,16 +158,16 @@ fn try_all(
         let found = one.is_found();
         tried.push(one);
         if found {
-            return Ok(Detection { found: Some((bit_rate, By::Frames)), tried });
+            return Ok(Detection { found: Some((bit_rate, Evidence::Frames)), tried });
         }
     }
     let mut acknowledged = tried.iter().filter(|one| one.acknowledged).map(|one| one.bit_rate);
     let found = acknowledged.next().filter(|_| acknowledged.next().is_none());
-    Ok(Detection { found: found.map(|bit_rate| (bit_rate, By::Acknowledge)), tried })
+    Ok(Detection { found: found.map(|bit_rate| (bit_rate, Evidence::Acknowledge)), tried })
 }
 
 /// Sets a bit rate. If the interface does not support the bit rate, returns false and records the reason.
-fn set(bus: &mut dyn Bus, mode: Mode, tried: &mut Tried) -> Result<bool, BusError> {
+fn set(bus: &mut dyn Bus, mode: Mode, tried: &mut RateResult) -> Result<bool, BusError> {
     match bus.set_bit_rate(tried.bit_rate, mode) {
         Ok(()) => Ok(true),
         Err(BusError::BitRate { why, .. }) => {
@@ -178,8 +178,8 @@ fn set(bus: &mut dyn Bus, mode: Mode, tried: &mut Tried) -> Result<bool, BusErro
     }
 }
 
-fn listen(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<Tried, Error> {
-    let mut tried = Tried::new(bit_rate, How::Listening);
+fn listen(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<RateResult, Error> {
+    let mut tried = RateResult::new(bit_rate, Method::Listening);
     if !set(bus, Mode::ListenOnly, &mut tried)? {
         return Ok(tried);
     }
@@ -197,8 +197,8 @@ fn listen(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<T
     Ok(tried)
 }
 
-fn ask_all(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<Tried, Error> {
-    let mut tried = Tried::new(bit_rate, How::Asking);
+fn ask_all(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<RateResult, Error> {
+    let mut tried = RateResult::new(bit_rate, Method::Asking);
     if !set(bus, Mode::Normal, &mut tried)? {
         return Ok(tried);
     }

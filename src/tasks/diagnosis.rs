@@ -1,12 +1,12 @@
 //! Why a node sends no measurements.
 //!
-//! [`diagnose`] decides from evidence, in this order: the last frames of the node ([`Heard`]), its present answers
+//! [`diagnose`] decides from evidence, in this order: the last frames of the node ([`ObservedFrames`]), its present answers
 //! ([`Inquiry`]), and the parameters of the TPDOs with the requested signals. Causes that cannot be distinguished are
 //! reported together: see [`Running`].
 
 mod inquiry;
 
-pub use inquiry::{Findings, Inquiry, questions};
+pub use inquiry::{Findings, Inquiry, objects_to_read};
 
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtState;
@@ -151,7 +151,7 @@ pub enum TpdoCause {
 
 /// The frames of a node while it was observed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Heard {
+pub struct ObservedFrames {
     /// The state of its last heartbeat; `None` after a boot-up.
     pub state: Option<NmtState>,
     /// The state that the last NMT command of another master demands; `None` if it is OPERATIONAL.
@@ -176,7 +176,7 @@ pub struct Heard {
 
 /// The way in which measurements were requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Situation {
+pub struct RequestContext {
     /// The waiting time.
     pub waited: Duration,
     /// SYNC messages that the program sent; `None` if it sends no SYNC.
@@ -191,39 +191,39 @@ pub struct Situation {
 pub fn diagnose(
     node: &Node,
     carries: &dyn Fn(&Tpdo) -> bool,
-    heard: &Heard,
+    observed: &ObservedFrames,
     findings: Option<&Findings>,
-    situation: &Situation,
+    context: &RequestContext,
 ) -> Silence {
-    let heartbeat = heard.state.filter(|_| !heard.heartbeat_stopped).map(|state| (state, Proof::Heartbeat));
+    let heartbeat = observed.state.filter(|_| !observed.heartbeat_stopped).map(|state| (state, Proof::Heartbeat));
     let answers = findings.map(|findings| findings.answers);
     // A node that answers is not stopped. A node that does not answer may be stopped.
-    let is_possible = |&state: &NmtState| !heard.sends_tpdos && answers != Some(state == NmtState::Stopped);
-    let commanded = heard.commanded.filter(is_possible).map(|state| (state, Proof::Command));
+    let is_possible = |&state: &NmtState| !observed.sends_tpdos && answers != Some(state == NmtState::Stopped);
+    let commanded = observed.commanded.filter(is_possible).map(|state| (state, Proof::Command));
     let known = heartbeat.or_else(|| findings.and_then(|findings| findings.state)).or(commanded);
-    let is_operational = heard.sends_tpdos || known.is_some_and(|(state, _)| state == NmtState::Operational);
+    let is_operational = observed.sends_tpdos || known.is_some_and(|(state, _)| state == NmtState::Operational);
     let running = match answers {
         _ if is_operational => Running::Operational,
         Some(true) => Running::NotStopped,
         _ => Running::Unknown,
     };
-    let was_started = situation.was_started;
+    let was_started = context.was_started;
     let cause = match known {
         Some((state, by)) if state != NmtState::Operational => SilenceCause::NotOperational { state, by, was_started },
-        _ if heard.booted && !is_operational => SilenceCause::Restarted,
-        _ if heard.wrong_length.is_some() || heard.shared.is_some() => frames_cause(node.id, heard),
-        _ if answers == Some(false) && !heard.sends_tpdos => {
-            SilenceCause::Unreachable { had_heartbeat: heard.heartbeat_stopped }
+        _ if observed.booted && !is_operational => SilenceCause::Restarted,
+        _ if observed.wrong_length.is_some() || observed.shared.is_some() => frames_cause(node.id, observed),
+        _ if answers == Some(false) && !observed.sends_tpdos => {
+            SilenceCause::Unreachable { had_heartbeat: observed.heartbeat_stopped }
         }
-        _ if heard.heartbeat_stopped && answers.is_none() => SilenceCause::HeartbeatStopped,
-        _ => setup_cause(node, carries, heard, findings, situation),
+        _ if observed.heartbeat_stopped && answers.is_none() => SilenceCause::HeartbeatStopped,
+        _ => setup_cause(node, carries, observed, findings, context),
     };
-    Silence { emergency: heard.emergency, running, ..Silence::of(cause) }
+    Silence { emergency: observed.emergency, running, ..Silence::of(cause) }
 }
 
 /// Why no values are decoded from the received TPDOs.
-fn frames_cause(node: NodeId, heard: &Heard) -> SilenceCause {
-    match (heard.shared, heard.wrong_length) {
+fn frames_cause(node: NodeId, observed: &ObservedFrames) -> SilenceCause {
+    match (observed.shared, observed.wrong_length) {
         (Some((id, [(one, first), (other, second)])), _) if one == other => {
             SilenceCause::SameCobId(id, [first, second])
         }
@@ -240,9 +240,9 @@ fn frames_cause(node: NodeId, heard: &Heard) -> SilenceCause {
 fn setup_cause(
     node: &Node,
     carries: &dyn Fn(&Tpdo) -> bool,
-    heard: &Heard,
+    observed: &ObservedFrames,
     findings: Option<&Findings>,
-    situation: &Situation,
+    context: &RequestContext,
 ) -> SilenceCause {
     let Some(first) = node.tpdos.first() else { return SilenceCause::NoTpdo };
     let valid: Vec<&Tpdo> = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).collect();
@@ -254,7 +254,7 @@ fn setup_cause(
     let empty = Findings::default();
     let known = findings.unwrap_or(&empty);
     let causes: Vec<(TpdoNumber, TpdoCause)> =
-        candidates.iter().map(|tpdo| (tpdo.number, tpdo_cause(node, tpdo, heard, known, situation))).collect();
+        candidates.iter().map(|tpdo| (tpdo.number, tpdo_cause(node, tpdo, observed, known, context))).collect();
     // If a due TPDO is not sent, the parameters of the other TPDOs are not the cause.
     let is_due = |cause: &TpdoCause| {
         matches!(
@@ -271,24 +271,30 @@ fn setup_cause(
 }
 
 /// Why a valid TPDO is not sent.
-fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situation: &Situation) -> TpdoCause {
+fn tpdo_cause(
+    node: &Node,
+    tpdo: &Tpdo,
+    observed: &ObservedFrames,
+    findings: &Findings,
+    context: &RequestContext,
+) -> TpdoCause {
     if tpdo.mapping.is_empty() {
         return TpdoCause::NothingMapped(findings.unsigned(tpdo.number.mapping(0)));
     }
-    let (received, length) = heard.syncs;
-    let seen = situation.syncs_sent.unwrap_or(0) + received;
+    let (received, length) = observed.syncs;
+    let seen = context.syncs_sent.unwrap_or(0) + received;
     let is_expected = node.sync_overflow.is_some();
     match tpdo.transmission {
-        _ if situation.requests => TpdoCause::NotSentOnRequest,
+        _ if context.requests => TpdoCause::NotSentOnRequest,
         None => TpdoCause::UnknownType,
         Some(Transmission::Rtr(code)) => TpdoCause::OnlyOnRequest(code),
-        Some(Transmission::AcyclicSync | Transmission::Sync(_)) if seen == 0 && situation.syncs_sent.is_none() => {
+        Some(Transmission::AcyclicSync | Transmission::Sync(_)) if seen == 0 && context.syncs_sent.is_none() => {
             TpdoCause::WaitsForSync(node.sync)
         }
         Some(Transmission::AcyclicSync | Transmission::Sync(_)) if received > 0 && is_expected != (length > 0) => {
             TpdoCause::SyncCounter { is_expected }
         }
-        Some(Transmission::AcyclicSync | Transmission::Sync(_)) if heard.emergency == Some(SYNC_LENGTH) => {
+        Some(Transmission::AcyclicSync | Transmission::Sync(_)) if observed.emergency == Some(SYNC_LENGTH) => {
             TpdoCause::SyncRejected
         }
         Some(Transmission::Sync(every)) if u64::from(every) > seen => TpdoCause::TooFewSyncs { every, seen },
@@ -298,7 +304,7 @@ fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situ
             .or_else(|| sync_start(node, tpdo, findings))
             .unwrap_or(TpdoCause::NotSentAtSync),
         Some(Transmission::Manufacturer | Transmission::Profile | Transmission::Reserved(_)) => {
-            event_cause(node, tpdo, findings, situation.waited)
+            event_cause(node, tpdo, findings, context.waited)
         }
     }
 }

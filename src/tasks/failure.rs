@@ -163,7 +163,7 @@ fn node_kind(error: &node::Error) -> Kind {
     match error {
         NodeError::Bus(_) => Kind::Bus,
         NodeError::Interrupted => Kind::Interrupted,
-        NodeError::Sdo(_) | NodeError::Unknown(_) | NodeError::NotKept { .. } | NodeError::Restarted(_) => {
+        NodeError::Sdo(_) | NodeError::Unknown(_) | NodeError::ReadBackDiffers { .. } | NodeError::Restarted(_) => {
             Kind::Unexpected
         }
         NodeError::Width { .. } | NodeError::Value { .. } | NodeError::TypeUnknown { .. } | NodeError::Name(_) => {
@@ -338,7 +338,7 @@ impl From<node::Error> for Failure {
             NodeError::Bus(error) => return error.into(),
             NodeError::Interrupted => return Error::Interrupted.into(),
             NodeError::Sdo(error) | NodeError::Unknown(error) => return error.into(),
-            NodeError::NotKept { node, object, .. }
+            NodeError::ReadBackDiffers { node, object, .. }
             | NodeError::Width { node, object, .. }
             | NodeError::Value { node, object, .. }
             | NodeError::TypeUnknown { node, object } => (node, Some(object)),

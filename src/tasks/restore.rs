@@ -4,7 +4,8 @@ use crate::master::Master;
 use crate::node::{Node, state};
 use crate::tasks::store::snapshot::{self, Snapshot};
 use crate::tasks::store::{
-    Difference, Group, StoreEffect, StoreFact, StoreFailure, StoreReport, Verb, Verified, check_capability, send,
+    Difference, Group, StoreCommand, StoreEffect, StoreFact, StoreFailure, StoreReport, Verified, check_capability,
+    send,
 };
 use crate::tasks::{Failure, Note};
 
@@ -17,13 +18,13 @@ use crate::tasks::{Failure, Note};
 /// - Bus errors and Ctrl-C.
 pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool) -> Result<StoreReport, Failure> {
     let node = device.id;
-    check_capability(master, device, Verb::Restore, group)?;
+    check_capability(master, device, StoreCommand::Restore, group)?;
     let objects = snapshot::objects(device, &[group]);
     let (before, state) = match reset {
         true => (snapshot::take(master, device, &objects)?, state::state(master, node)?),
         false => (Vec::new(), None),
     };
-    send(master, device, Verb::Restore, group)?;
+    send(master, device, StoreCommand::Restore, group)?;
     let mut report = StoreReport { node, groups: vec![group], verified: Verified::Ack, notes: Vec::new() };
     let note = |fact| Note::of_node(node, fact);
     if !reset {
@@ -32,7 +33,7 @@ pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool
     }
     let read = |master: &mut Master<'_>| snapshot::take(master, device, &objects);
     let (after, of_state) = snapshot::reset(master, node, state, read)
-        .map_err(|failure| failure.with(node, StoreEffect::NotVerified(Verb::Restore)))?;
+        .map_err(|failure| failure.with(node, StoreEffect::NotVerified(StoreCommand::Restore)))?;
     report.notes.extend(of_state);
     let Comparison { equal, unchanged } = compare(device, &before, &after)?;
     if !unchanged.is_empty() {

@@ -143,5 +143,5 @@ pub fn write(
         return Ok(written);
     }
     let (written, found) = (Value::Bytes(data.to_vec()), Value::Bytes(found));
-    Err(node::Error::NotKept { node: node.id, object, written, found }.into())
+    Err(node::Error::ReadBackDiffers { node: node.id, object, written, found }.into())
 }

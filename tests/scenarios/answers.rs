@@ -299,11 +299,11 @@ fn write_acknowledged_with_index_0_is_read_back() {
     let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 1 });
     let target = cangauge::node::Node::new(node());
     let written = cangauge::node::write::write(&mut master, &target, HEARTBEAT, &[0xf4, 1]).expect("it is read back");
-    let cangauge::node::Written::ReadBack(Some(heard)) = written else { panic!("{written:?}") };
-    assert_eq!(heard.to_string(), "585#6000000000000000");
+    let cangauge::node::Written::ReadBack(Some(received)) = written else { panic!("{written:?}") };
+    assert_eq!(received.to_string(), "585#6000000000000000");
     let error = cangauge::node::write::write(&mut master, &target, HEARTBEAT, &[1, 0]).expect_err("another value");
     let cangauge::node::Error::Sdo(error) = error else { panic!("{error:?}") };
-    assert!(error.to_string().ends_with("no answer within 100 ms; heard 585#6000000000000000"), "{error}");
+    assert!(error.to_string().ends_with("no answer within 100 ms; received 585#6000000000000000"), "{error}");
 }
 
 #[test]
@@ -316,7 +316,7 @@ fn answer_with_another_cob_id_is_reported() {
     let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 1 });
     master.listen_to(&[node()]).expect("filters");
     let error = master.transfer_one(Request::read(node(), HEARTBEAT)).expect("the bus works").expect_err("no answer");
-    assert!(error.to_string().ends_with("; heard 5C5#4B171000F4010000"), "{error}");
+    assert!(error.to_string().ends_with("; received 5C5#4B171000F4010000"), "{error}");
     // The channel that the user states.
     let channel = cangauge::bus::channels::SdoChannel {
         node: node(),

@@ -4,7 +4,7 @@ use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::bus::time::Mono;
 use cangauge::bus::{BitRateControl, Bus, Event, Mode};
 use cangauge::sim::Bench;
-use cangauge::tasks::detect::{By, Detection, How, RATES, detect};
+use cangauge::tasks::detect::{Detection, Evidence, Method, RATES, detect};
 use cangauge::tasks::{Failure, Kind};
 use std::path::Path;
 use std::time::Duration;
@@ -37,8 +37,8 @@ fn listening_finds_each_bit_rate_of_two_devices() {
     for rate in RATES {
         let mut bus = bench(rate, &[(5, 1000), (6, 900)]);
         let found = run(&mut bus, false).unwrap();
-        assert_eq!(found.found, Some((rate, By::Frames)), "{:?}", found.tried);
-        assert!(found.tried.iter().all(|tried| tried.how == How::Listening));
+        assert_eq!(found.found, Some((rate, Evidence::Frames)), "{:?}", found.tried);
+        assert!(found.tried.iter().all(|tried| tried.how == Method::Listening));
         assert_restored(&mut bus);
     }
 }
@@ -48,7 +48,7 @@ fn listening_does_not_disturb_the_bus() {
     let mut bus = bench(125_000, &[(5, 20), (6, 30)]);
     let mut undisturbed = bench(125_000, &[(5, 20), (6, 30)]);
     undisturbed.set_bit_rate(125_000, Mode::ListenOnly).unwrap();
-    assert_eq!(run(&mut bus, false).unwrap().found, Some((125_000, By::Frames)));
+    assert_eq!(run(&mut bus, false).unwrap().found, Some((125_000, Evidence::Frames)));
     // Afterwards each heartbeat has the same time as on the undisturbed bus.
     bus.set_bit_rate(125_000, Mode::ListenOnly).unwrap();
     let from = bus.now().mono;
@@ -80,7 +80,7 @@ fn single_sensor_needs_an_acknowledge() {
 
             let mut bus = bench(rate, &[(5, heartbeat)]);
             let found = run(&mut bus, true).unwrap();
-            assert_eq!(found.found, Some((rate, By::Frames)), "{:?}", found.tried);
+            assert_eq!(found.found, Some((rate, Evidence::Frames)), "{:?}", found.tried);
             assert_restored(&mut bus);
         }
     }

@@ -105,7 +105,7 @@ fn answer_with_another_cob_id_is_reported_with_the_channel() {
         let failure = found[0].failure.as_ref().expect("no answer with its own COB-ID");
         let text = ErrorMessage::from(failure);
         assert!(text.hint.is_some_and(|hint| hint.contains(channel)), "{}", text.message);
-        assert!(text.message.contains(&format!("heard {cob_id:03X}#43")), "{}", text.message);
+        assert!(text.message.contains(&format!("received {cob_id:03X}#43")), "{}", text.message);
     }
 }
 

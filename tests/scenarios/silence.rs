@@ -321,7 +321,7 @@ fn each_cause_has_its_reason() {
         (
             "another COB-ID than in 1801h:1, by timer",
             Case { no_nmt: true, ..Case::mh4(timer) }.with_other_frames(&[(2100, "3A5#00"), (2200, "745#05")]),
-            "no TPDO2 was received (frames with COB-ID 3A5 were received",
+            "no TPDO2 was received (frames were received with COB-ID 3A5",
         ),
         (
             "TPDO of another node with a heartbeat",

@@ -69,27 +69,27 @@ fn both_times_are_arrival_times() {
 fn only_frames_that_match_the_filters_arrive() {
     let can = Can::get();
     let (mut sender, mut bus) = (can.open(), can.open());
-    let mut heard = |filters: &Filters| {
+    let mut texts_of = |filters: &Filters| {
         bus.listen(filters).unwrap();
         for text in ["181#01", "00000181#02", "181#R1", "182#03", "00000182#04", "1F000181#05"] {
             sender.send(&frame(text)).unwrap();
         }
-        let mut heard = Vec::new();
+        let mut texts = Vec::new();
         let deadline = ahead(&bus, 100);
         while let Event::Frame(received) = bus.receive(deadline).unwrap() {
-            heard.push(received.frame.to_string());
+            texts.push(received.frame.to_string());
         }
-        heard
+        texts
     };
     let (standard, extended) = (CanId::Standard(0x181), CanId::Extended(0x181));
-    assert_eq!(heard(&Filters::Only(vec![standard])), ["181#01", "181#R1"]);
-    assert_eq!(heard(&Filters::Only(vec![extended, extended])), ["00000181#02"]);
-    assert_eq!(heard(&Filters::Only(vec![CanId::Standard(0x182), standard])), ["181#01", "181#R1", "182#03"]);
-    assert_eq!(heard(&Filters::Only(vec![])), [""; 0]);
+    assert_eq!(texts_of(&Filters::Only(vec![standard])), ["181#01", "181#R1"]);
+    assert_eq!(texts_of(&Filters::Only(vec![extended, extended])), ["00000181#02"]);
+    assert_eq!(texts_of(&Filters::Only(vec![CanId::Standard(0x182), standard])), ["181#01", "181#R1", "182#03"]);
+    assert_eq!(texts_of(&Filters::Only(vec![])), [""; 0]);
     // More filters than the kernel accepts.
     let many = (0x181..=0x181 + 1200u16).step_by(2).map(CanId::Standard).chain([extended]).collect();
-    assert_eq!(heard(&Filters::Only(many)), ["181#01", "00000181#02", "181#R1"]);
-    assert_eq!(heard(&Filters::All).len(), 6);
+    assert_eq!(texts_of(&Filters::Only(many)), ["181#01", "00000181#02", "181#R1"]);
+    assert_eq!(texts_of(&Filters::All).len(), 6);
 }
 
 #[test]

@@ -55,7 +55,7 @@ struct Case {
     fill: Vec<u8>,
     sent: VecDeque<Frame>,
     outcome: Option<String>,
-    heard: Vec<String>,
+    received: Vec<String>,
 }
 
 impl Case {
@@ -109,11 +109,11 @@ impl Case {
             }
             other => panic!("no such case: {other}"),
         };
-        Case { machine, fill, sent: VecDeque::from([request]), outcome: None, heard: Vec::new() }
+        Case { machine, fill, sent: VecDeque::from([request]), outcome: None, received: Vec::new() }
     }
 
     fn other(machine: Machine, sent: impl Into<VecDeque<Frame>>) -> Case {
-        Case { machine, fill: Vec::new(), sent: sent.into(), outcome: None, heard: Vec::new() }
+        Case { machine, fill: Vec::new(), sent: sent.into(), outcome: None, received: Vec::new() }
     }
 
     /// Cases other than SDO transfers.
@@ -178,7 +178,7 @@ impl Case {
     fn outcome(&self) -> Option<String> {
         match &self.machine {
             Machine::Sent => Some("sent".to_owned()),
-            Machine::Life(_) | Machine::Tpdo(..) => Some(self.heard.join("; ")),
+            Machine::Life(_) | Machine::Tpdo(..) => Some(self.received.join("; ")),
             Machine::Lss(exchange) if !exchange.is_answered() => Some("sent".to_owned()),
             Machine::Lss(exchange) => Some(match exchange.one() {
                 Ok(Answer::Acknowledge(_) | Answer::Selected | Answer::Here) => "done".to_owned(),
@@ -257,7 +257,7 @@ impl Case {
             Machine::Life(node) => {
                 let (of, life) = Life::parse(frame).expect("a heartbeat or boot-up message");
                 assert_eq!(of, *node, "{frame}");
-                self.heard.push(match life {
+                self.received.push(match life {
                     Life::BootUp => "boot-up".to_owned(),
                     Life::State(state) => state.to_string(),
                 });
@@ -265,7 +265,7 @@ impl Case {
             }
             Machine::Tpdo(id, fields, types) => {
                 assert_eq!(frame.id(), *id, "{frame}");
-                self.heard.push(values(frame, fields, types));
+                self.received.push(values(frame, fields, types));
                 None
             }
             Machine::Lss(exchange) => {

@@ -13,7 +13,7 @@ pub struct Exchange {
     requests: Vec<Request>,
     service: Service,
     /// The different answers in the order of arrival.
-    heard: Vec<(Frame, Result<Answer, Violation>)>,
+    received: Vec<(Frame, Result<Answer, Violation>)>,
     /// The number of answers, repeated ones included.
     count: usize,
     /// The number of requests.
@@ -36,7 +36,7 @@ pub enum ExchangeError {
 impl Exchange {
     /// A service of one frame.
     pub fn new(request: Request) -> Exchange {
-        Exchange { requests: vec![request], service: request.service(), heard: Vec::new(), count: 0, asked: 0 }
+        Exchange { requests: vec![request], service: request.service(), received: Vec::new(), count: 0, asked: 0 }
     }
 
     /// Switches the slave with this address to configuration state.
@@ -70,8 +70,8 @@ impl Exchange {
     pub fn on_frame(&mut self, frame: &Frame) -> bool {
         let Some(answer) = Answer::parse(frame, self.service) else { return false };
         self.count += 1;
-        if self.heard.len() < KEPT && !self.heard.iter().any(|(heard, _)| heard == frame) {
-            self.heard.push((*frame, answer));
+        if self.received.len() < KEPT && !self.received.iter().any(|(received, _)| received == frame) {
+            self.received.push((*frame, answer));
         }
         true
     }
@@ -84,12 +84,12 @@ impl Exchange {
     /// Whether more than one slave answered: the answers differ, or there were more answers than requests. If all
     /// slaves answer the service with the same frame, only different answers count.
     pub fn has_several_slaves(&self) -> bool {
-        self.heard.len() > 1 || self.count > self.asked
+        self.received.len() > 1 || self.count > self.asked
     }
 
     /// The different answers, with their frames.
     pub fn answers(&self) -> &[(Frame, Result<Answer, Violation>)] {
-        &self.heard
+        &self.received
     }
 
     /// The result of a service for one slave. If all slaves send the same frame ([`Service::has_common_answer`]),
@@ -98,9 +98,9 @@ impl Exchange {
     /// # Errors
     /// No answer, several slaves, a rejection, or a protocol violation.
     pub fn one(&self) -> Result<Answer, ExchangeError> {
-        let Some(&(frame, answer)) = self.heard.first() else { return Err(ExchangeError::NoAnswer) };
+        let Some(&(frame, answer)) = self.received.first() else { return Err(ExchangeError::NoAnswer) };
         if self.has_several_slaves() && !self.service.has_common_answer() {
-            return Err(ExchangeError::Several(self.heard.iter().map(|(frame, _)| *frame).collect()));
+            return Err(ExchangeError::Several(self.received.iter().map(|(frame, _)| *frame).collect()));
         }
         match answer.map_err(|violation| ExchangeError::Violation(violation, frame))? {
             Answer::Acknowledge(code) if !code.is_success() => Err(ExchangeError::Refused(code)),
@@ -115,12 +115,12 @@ mod tests {
     use crate::canopen::lss::Part;
 
     /// The result after `asked` requests and these frames.
-    fn outcome(request: Request, asked: usize, heard: &[&str]) -> Result<Answer, ExchangeError> {
+    fn outcome(request: Request, asked: usize, received: &[&str]) -> Result<Answer, ExchangeError> {
         let mut exchange = Exchange::new(request);
         for _ in 0..asked {
             assert_eq!(exchange.ask(), [request.frame()]);
         }
-        for text in heard {
+        for text in received {
             exchange.on_frame(&text.parse().expect("a frame"));
         }
         exchange.one()

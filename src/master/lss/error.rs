@@ -18,14 +18,14 @@ pub enum LssError {
         code: ErrorCode,
     },
     /// No slave answered in time.
-    #[error("LSS {service}: no answer within {}{}", format_duration(*.waited), .heard.map(|frame| format!("; heard {frame}")).unwrap_or_default())]
+    #[error("LSS {service}: no answer within {}{}", format_duration(*.waited), .received.map(|frame| format!("; received {frame}")).unwrap_or_default())]
     NoAnswer {
         /// The service.
         service: Service,
         /// The longest wait for one answer.
         waited: Duration,
         /// The first frame of a slave that answers another service.
-        heard: Option<Frame>,
+        received: Option<Frame>,
     },
     /// More than one slave answered a request for one slave.
     #[error("LSS {service}: more than one slave answers")]

@@ -5,7 +5,7 @@ use super::super::active::{LengthCheck, begins_blocks};
 use super::super::request::{Answer, Operation, SdoError, SdoFailure};
 use super::super::send::Outgoing;
 use super::super::transfer::Blocks;
-use super::{Active, Finished, Node};
+use super::{ActiveTransfer, Finished, Node};
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::sdo::{AbortCode, Progress, TransferError, Uploaded, abort_frame};
@@ -137,7 +137,7 @@ impl Node {
     }
 }
 
-impl Active {
+impl ActiveTransfer {
     /// Takes the next step after a frame of this transfer. The caller sends `out`.
     fn on_progress(
         &mut self,
@@ -208,7 +208,7 @@ impl Active {
         }
         if self.lacks_block_transfer(error) {
             self.request.fall_back();
-            *self = Active::new(self.ticket, self.request.clone(), context.accept_60, context.timing);
+            *self = ActiveTransfer::new(self.ticket, self.request.clone(), context.accept_60, context.timing);
             out.push(self.machine.request());
             return Step::Repeated;
         }

@@ -1,7 +1,9 @@
 //! Connects an expression to the devices: finds its signals and converts its units.
 
-pub use super::dimension::BareLimit;
-use super::dimension::{Dimension, Offsets, Typed, absolute, bare_limit, calculate, negative, to_one_unit, within};
+pub use super::dimension::LimitWithoutUnit;
+use super::dimension::{
+    Dimension, Offsets, Typed, absolute, calculate, limit_without_unit, negative, to_one_unit, within,
+};
 use super::formula::{Formula, Rule};
 use super::tree::{Condition, Function, Operator, Quantity, SignalName};
 use super::{Expression, ExpressionError, LocatedError};
@@ -183,7 +185,7 @@ pub struct BoundExpression {
     /// The values to measure.
     pub inputs: Vec<Input>,
     /// The limits without a unit.
-    pub bare_limits: Vec<BareLimit>,
+    pub limits_without_unit: Vec<LimitWithoutUnit>,
     /// The parts that are evaluated with each sample.
     pub(super) sample_rules: Vec<Rule>,
     /// The parts that are evaluated after the last sample.
@@ -240,7 +242,7 @@ impl Expression {
                 text: self.text.clone(),
                 node,
                 inputs: Vec::new(),
-                bare_limits: Vec::new(),
+                limits_without_unit: Vec::new(),
                 sample_rules: Vec::new(),
                 final_rules: Vec::new(),
                 aggregates: Vec::new(),
@@ -295,7 +297,7 @@ impl Binder<'_> {
         let mut functions = Vec::new();
         condition.functions(&mut functions);
         if !functions.iter().any(|function| matches!(function, Function::Rate | Function::Gap)) {
-            self.bound.bare_limits.extend(bare_limit(sides));
+            self.bound.limits_without_unit.extend(limit_without_unit(sides));
         }
     }
 
@@ -339,7 +341,7 @@ impl Binder<'_> {
             Quantity::Arithmetic(left, operator, right, sign) => {
                 let (left, right) = (self.typed(left)?, self.typed(right)?);
                 if matches!(operator, Operator::Add | Operator::Subtract) {
-                    self.bound.bare_limits.extend(bare_limit(&[&left, &right]));
+                    self.bound.limits_without_unit.extend(limit_without_unit(&[&left, &right]));
                 }
                 calculate(left, *operator, right, *sign, name)?
             }
@@ -421,7 +423,7 @@ mod tests {
         let node = NodeId::new(5).expect("a node-ID");
         let available = AvailableSignals::from_sources(&[Source { node, signal: "p".into(), unit: unit.into() }]);
         let expression = Expression::parse(text).expect("an expression");
-        let limits = expression.bind(Some(node), &available).expect("fits").bare_limits;
+        let limits = expression.bind(Some(node), &available).expect("fits").limits_without_unit;
         limits.iter().map(|limit| format!("{} {}", limit.limit, limit.unit)).collect()
     }
 

@@ -115,7 +115,7 @@ fn ambiguous(first: &Typed, second: &Typed, from: Unit, to: Unit) -> LocatedErro
 
 /// A number without a unit, and the unit of the device that it takes.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BareLimit {
+pub struct LimitWithoutUnit {
     /// The number as in the expression.
     pub limit: String,
     /// The unit.
@@ -123,12 +123,12 @@ pub struct BareLimit {
 }
 
 /// The number or the range (`9..11`) among `sides` that takes the unit of the device, because no side states a unit.
-pub(super) fn bare_limit(sides: &[&Typed]) -> Option<BareLimit> {
+pub(super) fn limit_without_unit(sides: &[&Typed]) -> Option<LimitWithoutUnit> {
     let unit = sides.iter().find_map(|side| side.measured_unit())?;
     let bare = sides.iter().filter(|side| side.dimension == Dimension::Literal);
     let limit = bare.map(|side| side.name.as_str()).collect::<Vec<_>>().join("..");
     let is_stated = limit.is_empty() || sides.iter().any(|side| side.is_literal());
-    (!is_stated).then_some(BareLimit { limit, unit })
+    (!is_stated).then_some(LimitWithoutUnit { limit, unit })
 }
 
 fn beside_each_other(first: Typed, second: Typed) -> (Typed, Typed) {

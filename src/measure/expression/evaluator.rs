@@ -5,7 +5,7 @@
 //! - A comparison of several signals is evaluated when each signal has a new value. If a signal has a second value
 //!   before that, its first value is compared with the latest other values. So no sample is skipped.
 
-use super::bind::{AvailableSignals, BareLimit, BoundExpression, unit_of};
+use super::bind::{AvailableSignals, BoundExpression, LimitWithoutUnit, unit_of};
 use super::comparison::Comparison;
 use super::series::SharedSignals;
 use super::verdict::{LiveResult, MissingData, Reason, Verdict};
@@ -145,9 +145,9 @@ impl Evaluator {
     }
 
     /// The limits without a unit, without repetitions.
-    pub fn bare_limits(&self) -> Vec<BareLimit> {
+    pub fn limits_without_unit(&self) -> Vec<LimitWithoutUnit> {
         let mut limits = Vec::new();
-        for limit in self.bound().flat_map(|bound| &bound.bare_limits) {
+        for limit in self.bound().flat_map(|bound| &bound.limits_without_unit) {
             if !limits.contains(limit) {
                 limits.push(limit.clone());
             }

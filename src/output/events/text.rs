@@ -6,7 +6,7 @@ use crate::bus::{Fault, ReceiveBuffer};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
 use crate::canopen::pdo::TpdoNumber;
-use crate::measure::expression::bind::BareLimit;
+use crate::measure::expression::bind::LimitWithoutUnit;
 use crate::output::diagnosis;
 use crate::output::failure::ErrorMessage;
 use crate::output::monitor::command_text;
@@ -192,7 +192,7 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::SyncsOmittedTooSlow(count) => format!("{count} SYNC omitted: the program was stopped or too slow"),
         Remark::SmallReceiveBuffer(buffer) => format!("frames were dropped: {}", buffer_text(*buffer)),
         Remark::Doubt(node, signal, doubt) => crate::output::doubt::doubt(*node, signal, *doubt),
-        Remark::BareLimit(BareLimit { limit, unit }) => {
+        Remark::LimitWithoutUnit(LimitWithoutUnit { limit, unit }) => {
             format!("limit {limit} has no unit: the unit of the device ({unit}) is used")
         }
         Remark::MayClip(node, value) => {

@@ -1,6 +1,6 @@
 //! Text for causes, effects and notes of `autozero` and `tare`.
 
-use super::Words;
+use super::CauseText;
 use crate::canopen::id::NodeId;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
@@ -10,50 +10,53 @@ use crate::tasks::autozero::{
 use crate::tasks::store::Group;
 
 /// The message and the hint for a cause.
-pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
+pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> CauseText {
     let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     match cause {
-        AutozeroFailure::NoAutozero { title } => Words::new(format!("{title} has no autozero")),
+        AutozeroFailure::NoAutozero { title } => CauseText::new(format!("{title} has no autozero")),
         AutozeroFailure::NoSuchChannel { title, channel, available } => {
-            Words::new(format!("{title} has no autozero of channel {channel}"))
+            CauseText::new(format!("{title} has no autozero of channel {channel}"))
                 .hint(format!("use one of: {}", list(available)))
         }
         AutozeroFailure::WhichChannel { target, available } if available.is_empty() => {
-            Words::new("the device has several channels: choose one")
+            CauseText::new("the device has several channels: choose one")
                 .hint(format!("cangauge {} {node} --channel 1", target.as_str()))
         }
         AutozeroFailure::NoTare => {
-            Words::new("no description or EDS of it has a tare (0x6139) and a net value (0x6140)")
+            CauseText::new("no description or EDS of it has a tare (0x6139) and a net value (0x6140)")
                 .hint("use a description with both: --device FILE or --eds FILE")
         }
         AutozeroFailure::NoTareOfChannel { channel, available } => {
-            Words::new(format!("it has no tare of channel {channel}")).hint(format!("use one of: {}", list(available)))
+            CauseText::new(format!("it has no tare of channel {channel}"))
+                .hint(format!("use one of: {}", list(available)))
         }
         AutozeroFailure::NoTareZero { channel } => {
-            Words::new(format!("it has no tare zero (0x6138:{channel}) that can be written"))
+            CauseText::new(format!("it has no tare zero (0x6138:{channel}) that can be written"))
                 .hint(format!("a reset may clear it: cangauge nmt reset {node}"))
         }
-        AutozeroFailure::WhichChannel { available, .. } => Words::new("the device has several channels: choose one")
-            .hint(format!("--channel with one of {}", list(available))),
+        AutozeroFailure::WhichChannel { available, .. } => {
+            CauseText::new("the device has several channels: choose one")
+                .hint(format!("--channel with one of {}", list(available)))
+        }
         AutozeroFailure::NoMeasuredValueOnChannel { channel } => {
-            Words::new(format!("it has no measured value on channel {channel}"))
+            CauseText::new(format!("it has no measured value on channel {channel}"))
         }
         AutozeroFailure::NoObject { channel, object, .. } => {
-            Words::new(format!("it has no autozero of channel {channel} (no {object})"))
+            CauseText::new(format!("it has no autozero of channel {channel} (no {object})"))
         }
         AutozeroFailure::LimitUnit { signal, unit, limit } => {
             let present = unit.map_or_else(|| "has no known unit".to_owned(), |unit| format!("is in {unit}"));
-            Words::new(format!("the limit in {limit} cannot be converted: {signal} {present}"))
+            CauseText::new(format!("the limit in {limit} cannot be converted: {signal} {present}"))
         }
         AutozeroFailure::RestartedBefore => {
-            Words::new("the device restarted during the measurement: nothing was changed")
+            CauseText::new("the device restarted during the measurement: nothing was changed")
         }
         AutozeroFailure::Unsafe { target, failed_check, channel } => {
-            let words = Words::new(format!("{}: nothing was changed", reason(failed_check)));
+            let words = CauseText::new(format!("{}: nothing was changed", reason(failed_check)));
             let choice = channel.map(|channel| format!(" --channel {channel}")).unwrap_or_default();
             words.hint(remedy(*target, failed_check, &node, &choice))
         }
-        AutozeroFailure::RestartedAfter => Words::new(
+        AutozeroFailure::RestartedAfter => CauseText::new(
             "the device accepted the signature, then restarted: the zero is lost unless the device stored it",
         ),
         AutozeroFailure::NotZero { signal, reading, has_acted, offset } => {
@@ -62,10 +65,10 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
                 Some(mean) => format!("nothing has changed: {signal} reads {}", quantity(*mean)),
                 None => format!("{signal} has no valid value afterwards"),
             };
-            Words::new(format!("the device accepted the signature, and {reads}; {}", offset_change(offset)))
+            CauseText::new(format!("the device accepted the signature, and {reads}; {}", offset_change(offset)))
         }
         AutozeroFailure::OtherOffsetStored => {
-            Words::new("the offset changed between the zero and the store: another offset was stored")
+            CauseText::new("the offset changed between the zero and the store: another offset was stored")
         }
     }
 }

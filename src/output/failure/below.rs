@@ -1,6 +1,6 @@
 //! Text for causes from the layers below the tasks: bus, SDO, LSS, expressions.
 
-use super::{Place, Words};
+use super::{CauseText, Place};
 use crate::bus::replay::{FileFormat, RecordingError, RecordingFormat};
 use crate::bus::time::format_duration;
 use crate::canopen::id::{CanId, NodeId};
@@ -16,8 +16,8 @@ use std::path::Path;
 use std::time::Duration;
 
 /// The bus failed.
-pub(super) fn bus(error: &BusError) -> Words {
-    let words = Words::new(error.to_string());
+pub(super) fn bus(error: &BusError) -> CauseText {
+    let words = CauseText::new(error.to_string());
     match error {
         BusError::QueueFull => words.hint(
             "no node acknowledges the frames: check the sensor's power, the bit rate, the wiring and the 120 ohm \
@@ -112,8 +112,8 @@ fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
 }
 
 /// An SDO transfer failed.
-pub(super) fn sdo(error: &SdoError) -> Words {
-    let words = Words::new(error.to_string());
+pub(super) fn sdo(error: &SdoError) -> CauseText {
+    let words = CauseText::new(error.to_string());
     match error.failure {
         SdoFailure::NoAnswer { waited, started, missed } => match silence_advice(error.node, waited, started, missed) {
             Some(hint) => words.hint(hint),
@@ -209,8 +209,8 @@ pub(super) fn check_silent_node(node: NodeId) -> String {
 }
 
 /// An LSS service failed.
-pub(super) fn lss(error: &LssError) -> Words {
-    let words = Words::new(error.to_string());
+pub(super) fn lss(error: &LssError) -> CauseText {
+    let words = CauseText::new(error.to_string());
     let hint = match error {
         LssError::Refused { service, .. } => refusal_hint(*service),
         LssError::NoAnswer { service, .. } => silence_hint(*service),
@@ -260,7 +260,7 @@ fn silence_hint(service: Service) -> Option<&'static str> {
 }
 
 /// An expression is wrong.
-pub(super) fn expression(error: &ExpressionError) -> Words {
+pub(super) fn expression(error: &ExpressionError) -> CauseText {
     let place = Place { before: error.before().to_owned(), text: error.text.clone() };
-    Words { message: error.message.clone(), hint: error.hint.clone(), place: Some(place) }
+    CauseText { message: error.message.clone(), hint: error.hint.clone(), place: Some(place) }
 }

@@ -1,6 +1,6 @@
 //! Text for causes: a check failed or had no data.
 
-use super::Words;
+use super::CauseText;
 use crate::measure::expression::verdict::Verdict;
 use crate::output::doubt;
 use crate::output::verdict::findings;
@@ -11,23 +11,25 @@ use crate::tasks::check::CheckFailure;
 const MAX_LISTED: usize = 3;
 
 /// The message and the hint for a cause.
-pub(super) fn words(failure: &Failure, cause: &CheckFailure) -> Words {
+pub(super) fn words(failure: &Failure, cause: &CheckFailure) -> CauseText {
     match cause {
         CheckFailure::NotSatisfied { failed, all } => {
             let mut list: Vec<String> = failed.iter().take(MAX_LISTED).map(describe).collect();
             if failed.len() > MAX_LISTED {
                 list.push(format!("{} more", failed.len() - MAX_LISTED));
             }
-            Words::new(format!("{} of {all} {} failed: {}", failed.len(), checks(*all), list.join("; ")))
+            CauseText::new(format!("{} of {all} {} failed: {}", failed.len(), checks(*all), list.join("; ")))
         }
         CheckFailure::UnknownType { signal } => {
-            let words = Words::new(doubt::unknown_type(signal));
+            let words = CauseText::new(doubt::unknown_type(signal));
             match failure.node {
                 Some(node) => words.hint(doubt::type_remedy(node, signal)),
                 None => words,
             }
         }
-        CheckFailure::NoData { without, all } => Words::new(format!("no data for {without} of {all} {}", checks(*all))),
+        CheckFailure::NoData { without, all } => {
+            CauseText::new(format!("no data for {without} of {all} {}", checks(*all)))
+        }
     }
 }
 

@@ -1,26 +1,27 @@
 //! Text for causes, effects and notes: settings were not applied, and reports about settings that were.
 
-use super::Words;
+use super::CauseText;
 use crate::output::notes::NoteText;
 use crate::tasks::config::{ConfigEffect, ConfigFact, ConfigFailure, Mistake, Problem};
 
 /// The message and the hint for a cause.
-pub(super) fn words(cause: &ConfigFailure) -> Words {
+pub(super) fn words(cause: &ConfigFailure) -> CauseText {
     match cause {
         ConfigFailure::Mistake { file, mistake } => of_mistake(file, mistake),
         ConfigFailure::Condition { place, key, wanted, found } => {
             let found = found.as_ref().map_or_else(|| "unknown".to_owned(), ToString::to_string);
-            let words = Words::new(format!("another device: {key} is {found}, the file has {wanted} (line {place})"));
+            let words =
+                CauseText::new(format!("another device: {key} is {found}, the file has {wanted} (line {place})"));
             match key.as_str() {
                 "calibration.serial" => words.hint("omit --with-calibration: a calibration is for one device only"),
                 _ => words.hint("compare both: cangauge config diff NODE FILE"),
             }
         }
         ConfigFailure::NoSerial { place } => {
-            Words::new(format!("[calibration] needs the serial number of its device (line {place})"))
+            CauseText::new(format!("[calibration] needs the serial number of its device (line {place})"))
                 .hint("add: serial = NUMBER; or omit --with-calibration")
         }
-        ConfigFailure::NotKept { settings, is_after_reset } => {
+        ConfigFailure::ReadBackDiffers { settings, is_after_reset } => {
             let list: Vec<String> = settings
                 .iter()
                 .map(|(key, wanted, found)| {
@@ -29,46 +30,46 @@ pub(super) fn words(cause: &ConfigFailure) -> Words {
                 })
                 .collect();
             let when = if *is_after_reset { "after the reset" } else { "read back" };
-            Words::new(format!("{when}: {}", list.join(", ")))
+            CauseText::new(format!("{when}: {}", list.join(", ")))
         }
         ConfigFailure::OthersOnBus { nodes } => {
             let list: Vec<String> = nodes.iter().map(ToString::to_string).collect();
             let nodes = if nodes.len() == 1 { "node" } else { "nodes" };
-            Words::new(format!("{nodes} {} on the bus: nothing was changed", list.join(", ")))
+            CauseText::new(format!("{nodes} {} on the bus: nothing was changed", list.join(", ")))
                 .hint("a node-ID must be free, and a bit rate is only set on a bus with one node")
         }
         ConfigFailure::NotOneDevice { serial, nodes } if nodes.is_empty() => {
-            Words::new(format!("no device with the serial number {serial} answers"))
+            CauseText::new(format!("no device with the serial number {serial} answers"))
                 .hint("check its power and cable; find the cause: cangauge doctor")
         }
         ConfigFailure::NotOneDevice { serial, nodes } => {
             let list: Vec<String> = nodes.iter().map(ToString::to_string).collect();
-            Words::new(format!("several devices have the serial number {serial}: node {}", list.join(", ")))
+            CauseText::new(format!("several devices have the serial number {serial}: node {}", list.join(", ")))
         }
         ConfigFailure::NotPluggedIn { serials } => {
             let list: Vec<String> = serials.iter().map(ToString::to_string).collect();
-            Words::new(format!("not plugged in, or not set: serial number {}", list.join(", ")))
+            CauseText::new(format!("not plugged in, or not set: serial number {}", list.join(", ")))
                 .hint("run the same command again: it continues with these")
         }
-        ConfigFailure::NoNodeId { serial } => Words::new(format!(
+        ConfigFailure::NoNodeId { serial } => CauseText::new(format!(
             "the device with the serial number {serial} has no node-ID, and the table has none for it"
         ))
         .hint("add it to the column \"node\""),
-        ConfigFailure::Journal { reason } => Words::new(format!("the journal cannot be written: {reason}")),
-        ConfigFailure::NoJournal => Words::new("nothing to roll back: the last change of this device was complete"),
+        ConfigFailure::Journal { reason } => CauseText::new(format!("the journal cannot be written: {reason}")),
+        ConfigFailure::NoJournal => CauseText::new("nothing to roll back: the last change of this device was complete"),
     }
 }
 
 /// `mh4.toml:12:5: tpdo.1.event-timer: "100" has no unit (100ms, 1s)`.
-fn of_mistake(file: &str, mistake: &Mistake) -> Words {
+fn of_mistake(file: &str, mistake: &Mistake) -> CauseText {
     let key = if mistake.key.is_empty() { String::new() } else { format!("{}: ", mistake.key) };
-    let Words { message, hint, .. } = of_problem(&mistake.problem);
-    Words { message: format!("{file}:{}: {key}{message}", mistake.place), hint, place: None }
+    let CauseText { message, hint, .. } = of_problem(&mistake.problem);
+    CauseText { message: format!("{file}:{}: {key}{message}", mistake.place), hint, place: None }
 }
 
-fn of_problem(problem: &Problem) -> Words {
+fn of_problem(problem: &Problem) -> CauseText {
     let list = |words: &[String]| words.join(", ");
-    Words::new(match problem {
+    CauseText::new(match problem {
         Problem::Syntax { message } => message.clone(),
         Problem::UnknownKey { device, nearest } => {
             let owner = device.as_ref().map(|title| format!("{title} has no such setting"));

@@ -1,17 +1,17 @@
 //! Text for causes and effects of `conform`.
 
-use super::Words;
+use super::CauseText;
 use crate::canopen::object::ObjectId;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::conform::{ConformEffect, ConformFailure};
 
 /// The message and the hint for a cause.
-pub(super) fn words(failure: &Failure, cause: &ConformFailure) -> Words {
+pub(super) fn words(failure: &Failure, cause: &ConformFailure) -> CauseText {
     let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     match cause {
         ConformFailure::Unfinished => {
-            Words::new("an earlier change of its settings was not completed: nothing was changed")
+            CauseText::new("an earlier change of its settings was not completed: nothing was changed")
                 .hint(format!("cangauge config apply {node} --rollback"))
         }
         ConformFailure::NotAlone { nodes, frame } => {
@@ -24,7 +24,7 @@ pub(super) fn words(failure: &Failure, cause: &ConformFailure) -> Words {
                     format!("nodes {} are on the bus, too", several.join(", "))
                 }
             };
-            Words::new(format!("{seen}: nothing was changed"))
+            CauseText::new(format!("{seen}: nothing was changed"))
                 .hint(format!("disconnect them, or check only one area: cangauge conform {node} --only sdo"))
         }
     }

@@ -1,10 +1,10 @@
 //! Text for causes: the bit rate of a bus was not found.
 
-use super::Words;
+use super::CauseText;
 use crate::tasks::detect::DetectFailure;
 
 /// The message and the hint for a cause.
-pub(super) fn words(cause: &DetectFailure) -> Words {
+pub(super) fn words(cause: &DetectFailure) -> CauseText {
     match cause {
         DetectFailure::NotFound { interface, detection, active } => {
             let has_errors = detection.tried.iter().any(|tried| tried.errors > 0);
@@ -23,13 +23,13 @@ pub(super) fn words(cause: &DetectFailure) -> Words {
                     "check the sensor's power, the wiring and the 120 ohm terminators".to_owned(),
                 ),
             };
-            Words::new(format!("{interface}: {message}")).hint(hint)
+            CauseText::new(format!("{interface}: {message}")).hint(hint)
         }
         DetectFailure::NotRestored { interface, found, error } => {
             let restored = format!("{interface} was not restored to its previous bit rate: {error}");
             match found {
-                Some(bit_rate) => Words::new(format!("the bus runs at {bit_rate} bit/s, but {restored}")),
-                None => Words::new(restored),
+                Some(bit_rate) => CauseText::new(format!("the bus runs at {bit_rate} bit/s, but {restored}")),
+                None => CauseText::new(restored),
             }
         }
     }

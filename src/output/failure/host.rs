@@ -1,6 +1,6 @@
 //! Text for causes: an interface of this computer was not set.
 
-use super::Words;
+use super::CauseText;
 use crate::tasks::host::{HostAction, HostFailure};
 
 /// The commands that bring an interface up by hand, at a bit rate in bit/s if one is given.
@@ -15,18 +15,19 @@ pub fn up_by_hand(interface: &str, bit_rate: Option<u32>) -> String {
 }
 
 /// The message and the hint for a cause.
-pub(super) fn words(cause: &HostFailure) -> Words {
+pub(super) fn words(cause: &HostFailure) -> CauseText {
     match cause {
         HostFailure::NotPermitted { what, action } => {
-            Words::new(format!("no permission to {what}")).hint(format!("by hand: {}", by_hand(action)))
+            CauseText::new(format!("no permission to {what}")).hint(format!("by hand: {}", by_hand(action)))
         }
         HostFailure::Unsupported { reason, action } => match action {
-            HostAction::Up { interface, bit_rate: Some(_), listen_only: false } => {
-                Words::new(reason.clone()).hint(format!("bring it up without a bit rate: cangauge bus up {interface}"))
+            HostAction::Up { interface, bit_rate: Some(_), listen_only: false } => CauseText::new(reason.clone())
+                .hint(format!("bring it up without a bit rate: cangauge bus up {interface}")),
+            HostAction::Up { .. } | HostAction::Down { .. } | HostAction::Detect { .. } => {
+                CauseText::new(reason.clone())
             }
-            HostAction::Up { .. } | HostAction::Down { .. } | HostAction::Detect { .. } => Words::new(reason.clone()),
         },
-        HostFailure::NoBitRate { interface } => Words::new(format!("{interface} has no bit rate yet"))
+        HostFailure::NoBitRate { interface } => CauseText::new(format!("{interface} has no bit rate yet"))
             .hint(format!("set one: cangauge bus up {interface} 250k")),
     }
 }

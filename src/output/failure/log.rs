@@ -1,6 +1,6 @@
 //! Text for causes: nothing was recorded, or a recording ended early.
 
-use super::Words;
+use super::CauseText;
 use crate::bus::time::format_duration;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
@@ -13,11 +13,11 @@ use crate::tasks::log::LogFailure;
 use std::time::Duration;
 
 /// The message and the hint for a cause.
-pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
+pub(super) fn words(failure: &Failure, cause: &LogFailure) -> CauseText {
     match cause {
-        LogFailure::UnknownSignal { name, known } => Words::new(format!("no node has a signal \"{name}\""))
+        LogFailure::UnknownSignal { name, known } => CauseText::new(format!("no node has a signal \"{name}\""))
             .hint(format!("the signals are: {}", known.join(", "))),
-        LogFailure::NoStatus { signal } => Words::new(format!("no node has a status object for {signal}")),
+        LogFailure::NoStatus { signal } => CauseText::new(format!("no node has a status object for {signal}")),
         LogFailure::NotMapped { name, disabled } => {
             let words = match disabled {
                 Some((node, number)) => format!(
@@ -26,61 +26,64 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
                 ),
                 None => format!("no TPDO contains {name}"),
             };
-            Words::new(words)
+            CauseText::new(words)
                 .hint("read it by SDO: --poll 100ms (without --sync); or put it into a TPDO: cangauge pdo map --help")
         }
         LogFailure::NotOverheard { name, known } => not_overheard(name, known),
         LogFailure::DifferentSyncIds(ids) => {
             let ids: Vec<String> = ids.iter().map(|(node, id)| format!("node {node}: {id}")).collect();
-            Words::new(format!("the nodes have different COB-IDs of SYNC (1005h): {}", ids.join(", ")))
+            CauseText::new(format!("the nodes have different COB-IDs of SYNC (1005h): {}", ids.join(", ")))
                 .hint("set 1005h to the same value in all nodes, or record them one by one")
         }
         LogFailure::DifferentSyncCounters(values) => {
             let values: Vec<String> = values.iter().map(|(node, value)| format!("node {node}: {value}")).collect();
-            Words::new(format!("the nodes expect different SYNC counters (1019h): {}", values.join(", ")))
+            CauseText::new(format!("the nodes expect different SYNC counters (1019h): {}", values.join(", ")))
                 .hint("set 1019h to the same value in all nodes, or record them one by one")
         }
-        LogFailure::SecondSyncProducer => Words::new("another node sends SYNC on this bus: nothing was started")
+        LogFailure::SecondSyncProducer => CauseText::new("another node sends SYNC on this bus: nothing was started")
             .hint("omit --sync: the other node already sends SYNC"),
         LogFailure::NoRtr { number } => no_rtr(*number),
-        LogFailure::TwoSenders(number) => {
-            Words::new(two_senders(*number)).hint("disconnect one of them, or change its node-ID: cangauge lss scan")
+        LogFailure::TwoSenders(number) => CauseText::new(two_senders(*number))
+            .hint("disconnect one of them, or change its node-ID: cangauge lss scan"),
+        LogFailure::Replaced => {
+            CauseText::new("another device has this node-ID now (with -o, its rows are in a new file)")
         }
-        LogFailure::Replaced => Words::new("another device has this node-ID now (with -o, its rows are in a new file)"),
         LogFailure::UnknownMapping => unknown_mapping(failure),
         LogFailure::OtherLength { mapped, received, is_live } => other_length(failure, *mapped, *received, *is_live),
         LogFailure::NothingReceived { within, nodes, has_traffic, interface } => {
             nothing_received(*within, nodes, *has_traffic, interface.as_deref())
         }
         LogFailure::NoMeasurements { within, nodes } => no_measurements(*within, nodes),
-        LogFailure::NodesLost { nodes, .. } => Words::new(nodes_lost(nodes)),
+        LogFailure::NodesLost { nodes, .. } => CauseText::new(nodes_lost(nodes)),
         LogFailure::OtherColumns { file, found, expected } => {
-            Words::new(format!("{file} has other columns: \"{found}\", not \"{expected}\""))
+            CauseText::new(format!("{file} has other columns: \"{found}\", not \"{expected}\""))
                 .hint("choose another file, or overwrite it with --force")
         }
         LogFailure::OutputClosed { rows } => {
-            Words::new(format!("the output was closed before the end: {} written", count(*rows)))
+            CauseText::new(format!("the output was closed before the end: {} written", count(*rows)))
         }
-        LogFailure::EndedEarly { rows } => Words::new(format!("interrupted before the end: {} written", count(*rows))),
+        LogFailure::EndedEarly { rows } => {
+            CauseText::new(format!("interrupted before the end: {} written", count(*rows)))
+        }
         LogFailure::RowsLost { rows, output } => {
-            Words::new(format!("{} lost: {output} could not keep up", count(*rows)))
+            CauseText::new(format!("{} lost: {output} could not keep up", count(*rows)))
         }
         LogFailure::FileDeleted { file } => {
-            Words::new(format!("{file} was deleted while it was written: its rows are lost"))
+            CauseText::new(format!("{file} was deleted while it was written: its rows are lost"))
         }
-        LogFailure::EventsLost { output } => Words::new(format!("events lost: {output} could not keep up")),
+        LogFailure::EventsLost { output } => CauseText::new(format!("events lost: {output} could not keep up")),
     }
 }
 
-fn unknown_mapping(failure: &Failure) -> Words {
+fn unknown_mapping(failure: &Failure) -> CauseText {
     let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
-    Words::new("the mapping of its TPDOs is unknown").hint(format!(
+    CauseText::new("the mapping of its TPDOs is unknown").hint(format!(
         "name the device: --device {node}=mh4 (or a file), or start recording before another master reads the mapping"
     ))
 }
 
-fn other_length(failure: &Failure, mapped: usize, received: usize, is_live: bool) -> Words {
-    let words = Words::new(diagnosis::wrong_length(mapped, received));
+fn other_length(failure: &Failure, mapped: usize, received: usize, is_live: bool) -> CauseText {
+    let words = CauseText::new(diagnosis::wrong_length(mapped, received));
     let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     words.hint(match is_live {
         true => "read by SDO instead: omit --passive, and add --poll 100ms".to_owned(),
@@ -88,14 +91,14 @@ fn other_length(failure: &Failure, mapped: usize, received: usize, is_live: bool
     })
 }
 
-fn no_rtr(number: TpdoNumber) -> Words {
+fn no_rtr(number: TpdoNumber) -> CauseText {
     let index = number.communication(1).index;
-    Words::new(format!("{number} does not answer remote requests (bit 30 of {index:04X}h:1): nothing was started"))
+    CauseText::new(format!("{number} does not answer remote requests (bit 30 of {index:04X}h:1): nothing was started"))
         .hint("read by SDO instead: --poll 100ms")
 }
 
-fn not_overheard(name: &str, known: &[String]) -> Words {
-    let words = Words::new(format!("none of the known TPDO mappings contains {name}"));
+fn not_overheard(name: &str, known: &[String]) -> CauseText {
+    let words = CauseText::new(format!("none of the known TPDO mappings contains {name}"));
     if known.is_empty() { words } else { words.hint(format!("they contain: {}", known.join(", "))) }
 }
 
@@ -109,11 +112,11 @@ fn count(rows: u64) -> String {
     if rows == 1 { "1 row".to_owned() } else { format!("{rows} rows") }
 }
 
-fn no_measurements(within: Duration, nodes: &[(NodeId, Silence)]) -> Words {
+fn no_measurements(within: Duration, nodes: &[(NodeId, Silence)]) -> CauseText {
     let within = format_duration(within);
     let words = match nodes {
-        [(_, silence)] => Words::new(format!("no measurements within {within}: {}", diagnosis::reason(silence))),
-        _ => Words::new(format!("no measurements from any node within {within}; {}", diagnosis::reasons(nodes))),
+        [(_, silence)] => CauseText::new(format!("no measurements within {within}: {}", diagnosis::reason(silence))),
+        _ => CauseText::new(format!("no measurements from any node within {within}; {}", diagnosis::reasons(nodes))),
     };
     match nodes.first().and_then(|(node, silence)| diagnosis::hint(silence, *node, "add")) {
         Some(hint) => words.hint(hint),
@@ -127,13 +130,13 @@ fn nothing_received(
     nodes: &[(NodeId, Option<NmtState>)],
     has_traffic: bool,
     interface: Option<&str>,
-) -> Words {
+) -> CauseText {
     let Some(interface) = interface else {
-        return Words::new("the recording contains no TPDO of these nodes");
+        return CauseText::new("the recording contains no TPDO of these nodes");
     };
     let within = format_duration(within);
     if !has_traffic {
-        return Words::new(format!("no measurements within {within}: no frame was received at all"))
+        return CauseText::new(format!("no measurements within {within}: no frame was received at all"))
             .hint(format!("check the cable and the bit rate: cangauge bus detect {interface}"));
     }
     let states: Vec<String> =
@@ -143,7 +146,7 @@ fn nothing_received(
         [(only, _)] => only.to_string(),
         _ => "all".to_owned(),
     };
-    let words = Words::new(format!("no measurements within {within}: no TPDO received{states}"));
+    let words = CauseText::new(format!("no measurements within {within}: no TPDO received{states}"));
     // The nodes are already started, so they wait for another trigger.
     if nodes.iter().all(|(_, state)| *state == Some(NmtState::Operational)) {
         return words.hint("--passive cannot read the reason from the nodes: omit it");

@@ -1,6 +1,6 @@
 //! Text for causes and effects: a node-ID or a bit rate was not set.
 
-use super::Words;
+use super::CauseText;
 use super::below;
 use crate::bus::time::format_duration;
 use crate::canopen::id::NodeId;
@@ -17,7 +17,7 @@ use crate::tasks::lss::{
 const CONNECT_ALONE: &str = "connect only this device";
 
 /// The message and the hint for a cause. A device without a known node-ID is shown by its identity.
-pub(super) fn words(failure: &Failure, cause: &LssFailure) -> Words {
+pub(super) fn words(failure: &Failure, cause: &LssFailure) -> CauseText {
     let mut words = cause_words(failure, cause);
     if let (None, Some(address)) = (failure.node, cause.device.address) {
         words.message = format!("{address}: {}", words.message);
@@ -25,44 +25,46 @@ pub(super) fn words(failure: &Failure, cause: &LssFailure) -> Words {
     words
 }
 
-fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
+fn cause_words(failure: &Failure, cause: &LssFailure) -> CauseText {
     match &cause.cause {
         LssCause::Service(error) => service(&cause.device, error),
         LssCause::OtherDescription(device) => {
             let code =
                 |number: Option<u32>| number.map_or_else(|| "unknown".to_owned(), |number| format!("0x{number:X}"));
             let (file, vendor, product) = (&device.file, code(device.vendor), code(device.product));
-            Words::new(format!("{file} is for another device: vendor {vendor}, product {product}"))
+            CauseText::new(format!("{file} is for another device: vendor {vendor}, product {product}"))
                 .hint("choose the file of this device, or add --accept-mismatch")
         }
         LssCause::NoSerialNumber => {
-            Words::new("it has no serial number, so it cannot be distinguished from another device")
+            CauseText::new("it has no serial number, so it cannot be distinguished from another device")
                 .hint("connect only this device, and use the target \"only\"")
         }
         LssCause::DuplicateNodeId(sign) => duplicate_node_id(*sign),
-        LssCause::NoAnswer(waited) => Words::new(format!("no answer within {}", format_duration(*waited)))
+        LssCause::NoAnswer(waited) => CauseText::new(format!("no answer within {}", format_duration(*waited)))
             .hint(below::check_node(cause.device.node)),
         LssCause::OtherNodeIdByLss(found) => other_node_id(*found),
-        LssCause::SameIdentity(other) => Words::new(format!("node {other} has the same identity")).hint(CONNECT_ALONE),
-        LssCause::SeveralWithIdentity => Words::new("more than one device has this identity").hint(CONNECT_ALONE),
+        LssCause::SameIdentity(other) => {
+            CauseText::new(format!("node {other} has the same identity")).hint(CONNECT_ALONE)
+        }
+        LssCause::SeveralWithIdentity => CauseText::new("more than one device has this identity").hint(CONNECT_ALONE),
         LssCause::NotTheOnly(sign) => {
             let names = cause.device.node.map_or_else(|| "node-ID".to_owned(), |node| format!("node-ID ({node})"));
-            Words::new(another(sign))
+            CauseText::new(another(sign))
                 .hint(format!("use the {names} or the identity of one device; list them: cangauge lss scan"))
         }
-        LssCause::NoDevice => Words::new("no device answers by SDO or LSS")
+        LssCause::NoDevice => CauseText::new("no device answers by SDO or LSS")
             .hint("check power, wiring and bit rate; find the cause: cangauge doctor all"),
-        LssCause::NoUnconfigured => Words::new("no device without a node-ID answers")
+        LssCause::NoUnconfigured => CauseText::new("no device without a node-ID answers")
             .hint("fastscan finds only devices without a node-ID; find the others: cangauge doctor all"),
-        LssCause::NoneInRange(range) => Words::new(format!("no LSS slave within {range} answers")),
-        LssCause::NoInquiry => Words::new("it does not support the LSS inquiries (5Ah to 5Eh)")
+        LssCause::NoneInRange(range) => CauseText::new(format!("no LSS slave within {range} answers")),
+        LssCause::NoInquiry => CauseText::new("it does not support the LSS inquiries (5Ah to 5Eh)")
             .hint("read its identity by SDO: cangauge scan"),
         LssCause::Taken(new, sign) => {
             let sign = match sign {
                 TakenSign::Answer => "a node answers",
                 TakenSign::Heartbeat => "a node sends heartbeats",
             };
-            Words::new(format!("node-ID {new} is taken ({sign})")).hint("list the devices: cangauge lss scan")
+            CauseText::new(format!("node-ID {new} is taken ({sign})")).hint("list the devices: cangauge lss scan")
         }
         LssCause::ObjectsUnknown
         | LssCause::ObjectsOutOfReach
@@ -85,17 +87,17 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
 }
 
 /// A device with the same identity has another node-ID, or none.
-fn other_node_id(found: Option<NodeId>) -> Words {
+fn other_node_id(found: Option<NodeId>) -> CauseText {
     let found = found.map_or_else(|| "has no node-ID".to_owned(), |found| format!("has node-ID {found}"));
-    Words::new(format!("a device with the same identity answers LSS and {found}")).hint(CONNECT_ALONE)
+    CauseText::new(format!("a device with the same identity answers LSS and {found}")).hint(CONNECT_ALONE)
 }
 
 /// The answers from a node-ID cannot be assigned to one device.
-fn duplicate_node_id(sign: DuplicateSign) -> Words {
+fn duplicate_node_id(sign: DuplicateSign) -> CauseText {
     let words = duplicate(sign);
     match sign {
-        DuplicateSign::OtherMaster => Words::new(words).hint("stop the other program, or try again"),
-        _ => Words::new(format!("{words}: several devices probably have this node-ID")).hint(
+        DuplicateSign::OtherMaster => CauseText::new(words).hint("stop the other program, or try again"),
+        _ => CauseText::new(format!("{words}: several devices probably have this node-ID")).hint(
             "connect one device at a time, or use the identity on its label: \
              cangauge lss set-id VENDOR:PRODUCT:REVISION:SERIAL NEW",
         ),
@@ -103,7 +105,7 @@ fn duplicate_node_id(sign: DuplicateSign) -> Words {
 }
 
 /// An LSS service failed. A silent device may answer in STOPPED.
-fn service(device: &DeviceName, error: &LssError) -> Words {
+fn service(device: &DeviceName, error: &LssError) -> CauseText {
     let words = below::lss(error);
     let is_silent = matches!(error, LssError::NoAnswer { service, .. } if below::is_addressing(*service));
     match (device.node, device.address) {
@@ -115,33 +117,33 @@ fn service(device: &DeviceName, error: &LssError) -> Words {
 }
 
 /// The objects of the device cannot be used.
-fn objects(cause: &LssCause) -> Words {
+fn objects(cause: &LssCause) -> CauseText {
     const BY_LSS: &str = "use LSS: --via lss";
     match cause {
-        LssCause::ObjectsUnknown => Words::new("the objects that set its node-ID and bit rate are unknown")
+        LssCause::ObjectsUnknown => CauseText::new("the objects that set its node-ID and bit rate are unknown")
             .hint("use LSS: --via lss; or choose a description: --device NAME"),
-        LssCause::ObjectsOutOfReach => Words::new("SDO does not reach it, or another device has the same node-ID")
+        LssCause::ObjectsOutOfReach => CauseText::new("SDO does not reach it, or another device has the same node-ID")
             .hint(format!("{CONNECT_ALONE}, or {BY_LSS}")),
         LssCause::NoObject(setting) => {
             let setting = match setting {
                 Setting::NodeId => "node-ID",
                 Setting::BitRate => "bit rate",
             };
-            Words::new(format!("the object that sets its {setting} is unknown")).hint(BY_LSS)
+            CauseText::new(format!("the object that sets its {setting} is unknown")).hint(BY_LSS)
         }
-        LssCause::Number(object, reason) => Words::new(format!("{object}: {reason}")),
-        LssCause::NeedsStore(Some(object)) => {
-            Words::new(format!("its objects take effect only after they are stored ({object}) and the device is reset"))
-                .hint(format!("omit --no-store, or {BY_LSS}"))
-        }
-        LssCause::NeedsStore(None) => Words::new("the device stores its objects as soon as they are written")
+        LssCause::Number(object, reason) => CauseText::new(format!("{object}: {reason}")),
+        LssCause::NeedsStore(Some(object)) => CauseText::new(format!(
+            "its objects take effect only after they are stored ({object}) and the device is reset"
+        ))
+        .hint(format!("omit --no-store, or {BY_LSS}")),
+        LssCause::NeedsStore(None) => CauseText::new("the device stores its objects as soon as they are written")
             .hint(format!("omit --no-store, or {BY_LSS}")),
-        _ => Words::default(),
+        _ => CauseText::default(),
     }
 }
 
 /// The bit rate is not in the table of the device.
-fn table(cause: &LssCause) -> Words {
+fn table(cause: &LssCause) -> CauseText {
     match cause {
         LssCause::NoSuchRate { title, rate, rates, has_auto, is_standard } => {
             let wanted = match rate {
@@ -153,58 +155,59 @@ fn table(cause: &LssCause) -> Words {
             list.extend(has_auto.then(|| "auto".to_owned()));
             let source = if *is_standard { "the table of CiA 305" } else { "its table" };
             let title = title.as_deref().unwrap_or("CiA 305");
-            Words::new(format!("{title} has no bit rate {wanted}"))
+            CauseText::new(format!("{title} has no bit rate {wanted}"))
                 .hint(format!("{source} has {}; for another rate: --table-index N", list.join(", ")))
         }
         LssCause::RateCodesUnknown(title) => {
             let title = title.as_deref().unwrap_or("this device");
-            Words::new(format!("the bit rate codes of {title} are unknown"))
+            CauseText::new(format!("the bit rate codes of {title} are unknown"))
                 .hint("find the code in its manual, then use --table-index N")
         }
-        _ => Words::default(),
+        _ => CauseText::default(),
     }
 }
 
 /// The device does not respond at its new node-ID.
-fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
+fn after_reset(failure: &Failure, cause: &LssCause) -> CauseText {
     match cause {
         LssCause::NotReset(new, why) => {
             let why = match why {
                 NotReset::SharedNodeId(node) => format!("another device also has node-ID {node}"),
                 NotReset::NodeIdUnknown => "its present node-ID is unknown".to_owned(),
             };
-            Words::new(format!("not reset, because {why}: node-ID {new} is not confirmed"))
+            CauseText::new(format!("not reset, because {why}: node-ID {new} is not confirmed"))
         }
         LssCause::OtherDeviceAnswers(found) => {
-            Words::new(format!("another device answers under the new node-ID: {found}"))
+            CauseText::new(format!("another device answers under the new node-ID: {found}"))
         }
-        LssCause::NotIdentified => Words::new("the device with the new node-ID reports no identity"),
+        LssCause::NotIdentified => CauseText::new("the device with the new node-ID reports no identity"),
         LssCause::DuplicateNewNodeId(DuplicateSign::OtherMaster) => {
-            Words::new(duplicate(DuplicateSign::OtherMaster)).hint("stop the other program, and check: cangauge scan")
+            CauseText::new(duplicate(DuplicateSign::OtherMaster))
+                .hint("stop the other program, and check: cangauge scan")
         }
         LssCause::DuplicateNewNodeId(sign) => {
-            Words::new(format!("{}: several devices have this node-ID", duplicate(*sign)))
+            CauseText::new(format!("{}: several devices have this node-ID", duplicate(*sign)))
         }
         LssCause::SilentAfterBootUp(waited) => {
-            Words::new(format!("boot-up received, then no answer within {}", format_duration(*waited)))
+            CauseText::new(format!("boot-up received, then no answer within {}", format_duration(*waited)))
         }
         LssCause::StillOldNodeId { old, new } => {
-            Words::new(format!("it was reset but still has node-ID {old}, not {new}"))
+            CauseText::new(format!("it was reset but still has node-ID {old}, not {new}"))
         }
         LssCause::NotSeen { new, waited } => {
             let words =
-                Words::new(format!("no boot-up and no answer from node {new} within {}", format_duration(*waited)));
+                CauseText::new(format!("no boot-up and no answer from node {new} within {}", format_duration(*waited)));
             match failure.node {
                 Some(_) => words.hint("list the devices: cangauge lss scan"),
                 None => words,
             }
         }
-        _ => Words::default(),
+        _ => CauseText::default(),
     }
 }
 
 /// Device and host did not change the bit rate together.
-fn retime(cause: &LssCause) -> Words {
+fn retime(cause: &LssCause) -> CauseText {
     match cause {
         LssCause::HostCannotChange(obstacle) => {
             let why = match obstacle {
@@ -213,7 +216,7 @@ fn retime(cause: &LssCause) -> Words {
                 HostObstacle::AppliesAtPowerOn => "the device changes its bit rate at power-on",
                 HostObstacle::AppliesAfterStore => "the device changes its bit rate only after it is stored",
             };
-            Words::new(format!("{why}, so the host cannot change its bit rate together with the device"))
+            CauseText::new(format!("{why}, so the host cannot change its bit rate together with the device"))
                 .hint("omit --retime, and set the interface by hand")
         }
         LssCause::NotAloneForRetime(neighbour) => {
@@ -222,19 +225,19 @@ fn retime(cause: &LssCause) -> Words {
                 Neighbour::Unconfigured => "a device without a node-ID is".to_owned(),
                 Neighbour::Sender(id) => format!("a sender of frames {id} is"),
             };
-            Words::new(format!("{other} on the bus too; --retime requires a single device"))
+            CauseText::new(format!("{other} on the bus too; --retime requires a single device"))
                 .hint(format!("{CONNECT_ALONE}, or omit --retime"))
         }
-        LssCause::SilentAtRate(bits) => Words::new(format!("it does not answer at {}", short(*bits))),
+        LssCause::SilentAtRate(bits) => CauseText::new(format!("it does not answer at {}", short(*bits))),
         LssCause::SilentAfterStore { bit_rate, interface, host } => {
             let new = short(*bit_rate);
-            let words = Words::new(format!(
+            let words = CauseText::new(format!(
                 "stored and reset, but the device does not answer at {new}; the host uses {}",
                 short(*host)
             ));
             words.hint(format!("find its bit rate: cangauge bus detect {interface} --active"))
         }
-        _ => Words::default(),
+        _ => CauseText::default(),
     }
 }
 

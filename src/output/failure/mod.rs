@@ -70,18 +70,18 @@ impl Place {
 
 /// The text for a cause, without the node in front.
 #[derive(Clone, Debug, Default)]
-struct Words {
+struct CauseText {
     message: String,
     hint: Option<String>,
     place: Option<Place>,
 }
 
-impl Words {
-    fn new(message: impl Into<String>) -> Words {
-        Words { message: message.into(), ..Words::default() }
+impl CauseText {
+    fn new(message: impl Into<String>) -> CauseText {
+        CauseText { message: message.into(), ..CauseText::default() }
     }
 
-    fn hint(mut self, hint: impl Into<String>) -> Words {
+    fn hint(mut self, hint: impl Into<String>) -> CauseText {
         self.hint = Some(hint.into());
         self
     }
@@ -211,16 +211,16 @@ impl From<&Failure> for ErrorMessage {
     }
 }
 
-fn words(failure: &Failure) -> Words {
+fn words(failure: &Failure) -> CauseText {
     match &failure.cause {
         Cause::Bus(error) => below::bus(error),
         Cause::Sdo(error) => below::sdo(error),
         Cause::LssService(error) => below::lss(error),
         Cause::Node(error) => node::words(failure, error),
         Cause::Host(cause) => host::words(cause),
-        Cause::Interrupted => Words::new("interrupted"),
+        Cause::Interrupted => CauseText::new("interrupted"),
         Cause::Expression(error) => below::expression(error),
-        Cause::Unconfirmed(name) => Words::new(format!("the description {name} is not confirmed by a manual"))
+        Cause::Unconfirmed(name) => CauseText::new(format!("the description {name} is not confirmed by a manual"))
             .hint(format!("if it is the right description, add: --device {name}")),
         Cause::Read(cause) => read::words(failure, cause),
         Cause::Scan(cause) => scan::words(failure, cause),

@@ -1,6 +1,6 @@
 //! Text for causes, effects and notes: a TPDO could not be shown or changed, and reports about a change.
 
-use super::{Words, below};
+use super::{CauseText, below};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::{MappingEntry, Transmission};
 use crate::output::diagnosis;
@@ -16,53 +16,52 @@ use crate::tasks::store::Group;
 const MAX_LISTED: usize = 16;
 
 /// The message and the hint for a cause.
-pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
+pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> CauseText {
     match cause {
-        PdoFailure::NoTpdo => Words::new("no TPDO"),
+        PdoFailure::NoTpdo => CauseText::new("no TPDO"),
         PdoFailure::Rejected { error, available } => {
             let numbers: Vec<String> = available.iter().map(|number| number.get().to_string()).collect();
-            Words::new(error.to_string()).hint(format!("it has the TPDOs {}", numbers.join(", ")))
+            CauseText::new(error.to_string()).hint(format!("it has the TPDOs {}", numbers.join(", ")))
         }
-        PdoFailure::Restarted => Words::new("it restarted while its TPDO was read"),
+        PdoFailure::Restarted => CauseText::new("it restarted while its TPDO was read"),
         PdoFailure::Multiplexed { number } => {
-            Words::new(format!("{number} is a multiplexed PDO: its mapping is not a list"))
+            CauseText::new(format!("{number} is a multiplexed PDO: its mapping is not a list"))
         }
         PdoFailure::NotStored { number } => {
-            Words::new(format!("it does not store the settings of {number}: nothing was changed"))
+            CauseText::new(format!("it does not store the settings of {number}: nothing was changed"))
                 .hint("omit --store, and set the TPDO after every power-on")
         }
         PdoFailure::FixedMapping { number, mapping } => {
             let entries = list(mapping);
-            Words::new(format!("the mapping of {number} is fixed ({entries}): nothing was changed"))
+            CauseText::new(format!("the mapping of {number} is fixed ({entries}): nothing was changed"))
         }
         PdoFailure::Occupied { id, by } => {
-            Words::new(format!("identifier 0x{id} is used by {}: nothing was changed", cob_id_user(by)))
+            CauseText::new(format!("identifier 0x{id} is used by {}: nothing was changed", cob_id_user(by)))
                 .hint("choose another identifier: --cob-id")
         }
         PdoFailure::Restricted { id } => {
-            Words::new(format!("identifier 0x{id} is not for PDOs (CiA 301 reserves it for other services)"))
+            CauseText::new(format!("identifier 0x{id} is not for PDOs (CiA 301 reserves it for other services)"))
                 .hint("PDOs can use 0x181 to 0x57F, if no other node uses the identifier")
         }
         PdoFailure::NoIdentifier { number, id } => {
-            Words::new(format!("{number} has no identifier yet (0x{id})")).hint("set one: --cob-id 0x3A5")
+            CauseText::new(format!("{number} has no identifier yet (0x{id})")).hint("set one: --cob-id 0x3A5")
         }
         PdoFailure::NoParameter { number, parameter } => {
             let name = match parameter {
                 Parameter::EventTimer => "event timer",
                 Parameter::InhibitTime => "inhibit time",
             };
-            Words::new(format!("{number} has no {name} ({} does not exist)", parameter.object(*number)))
+            CauseText::new(format!("{number} has no {name} ({} does not exist)", parameter.object(*number)))
         }
         PdoFailure::TooLong { bits } => {
             let length = if bits % 8 == 0 { format!("{} bytes", bits / 8) } else { format!("{bits} bits") };
-            Words::new(format!("the mapping has {length}; a PDO has at most 8 bytes"))
+            CauseText::new(format!("the mapping has {length}; a PDO has at most 8 bytes"))
         }
         PdoFailure::UnknownName { name, nearest, signals } => unknown_name(name, nearest, signals),
-        PdoFailure::WidthUnknown { object } => {
-            Words::new(format!("the width of {object} is unknown")).hint(format!("add the width in bits: {object}/32"))
-        }
+        PdoFailure::WidthUnknown { object } => CauseText::new(format!("the width of {object} is unknown"))
+            .hint(format!("add the width in bits: {object}/32")),
         PdoFailure::Change { error, write, mappable } => {
-            let words = Words::new(step(error, write.as_ref()));
+            let words = CauseText::new(step(error, write.as_ref()));
             match mappable.is_empty() {
                 true => words,
                 false => words.hint(format!("it can map: {}", list_some(mappable))),
@@ -72,8 +71,8 @@ pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
     }
 }
 
-fn unknown_name(name: &str, nearest: &[String], signals: &[String]) -> Words {
-    let words = Words::new(format!("no object or signal \"{name}\""));
+fn unknown_name(name: &str, nearest: &[String], signals: &[String]) -> CauseText {
+    let words = CauseText::new(format!("no object or signal \"{name}\""));
     match (nearest, signals) {
         ([], []) => words,
         ([], signals) => words.hint(format!("its signals: {}", signals.join(", "))),
@@ -81,11 +80,11 @@ fn unknown_name(name: &str, nearest: &[String], signals: &[String]) -> Words {
     }
 }
 
-fn nothing_received(nodes: &[(NodeId, Silence)]) -> Words {
+fn nothing_received(nodes: &[(NodeId, Silence)]) -> CauseText {
     if nodes.is_empty() {
-        return Words::new("no TPDO was received");
+        return CauseText::new("no TPDO was received");
     }
-    let words = Words::new(format!("no TPDO was received; {}", diagnosis::reasons(nodes)));
+    let words = CauseText::new(format!("no TPDO was received; {}", diagnosis::reasons(nodes)));
     let hint = |(node, silence): &(NodeId, Silence)| diagnosis::hint(silence, *node, &format!("cangauge log {node}"));
     match nodes.first().and_then(hint) {
         Some(hint) => words.hint(hint),
@@ -134,7 +133,7 @@ fn step(error: &StepError, write: Option<&StepWrite>) -> String {
         StepError::Interrupted => at.map_or_else(|| "interrupted".to_owned(), |at| format!("interrupted at {at}")),
         StepError::NotRecorded(error) => below::not_recorded(error),
         StepError::Bus(error) => at.map_or_else(|| error.to_string(), |at| format!("{error} at {at}")),
-        StepError::NotKept { object, found, written } => {
+        StepError::ReadBackDiffers { object, found, written } => {
             format!("the write of {object} was acknowledged, but its value is {found:#X} instead of {written:#X}")
         }
     }
@@ -187,7 +186,7 @@ pub(in crate::output) fn fact(fact: &PdoFact) -> NoteText {
         PdoFact::AlreadySet { number } => {
             NoteText::new("already-set", format!("{number} has these settings already: nothing was written"))
         }
-        PdoFact::NotKept { number } => NoteText::new(
+        PdoFact::LostAtPowerOff { number } => NoteText::new(
             "not-kept",
             format!("the device does not store the settings of {number}: they are lost at power off"),
         ),

@@ -1,6 +1,6 @@
 //! Text for causes: measured values could not be read.
 
-use super::Words;
+use super::CauseText;
 use crate::measure::sample::Status;
 use crate::output::doubt::{type_remedy, unknown_type};
 use crate::output::text::spaced_bytes;
@@ -8,44 +8,44 @@ use crate::tasks::Failure;
 use crate::tasks::read::ReadFailure;
 
 /// The message and the hint for a cause.
-pub(super) fn words(failure: &Failure, cause: &ReadFailure) -> Words {
+pub(super) fn words(failure: &Failure, cause: &ReadFailure) -> CauseText {
     match cause {
         ReadFailure::NoMeasuredValue => {
-            let words = Words::new("no measured value of CiA 404");
+            let words = CauseText::new("no measured value of CiA 404");
             match failure.node {
                 Some(node) => words.hint(format!("read an object: cangauge sdo read {node} 0x1000")),
                 None => words,
             }
         }
         ReadFailure::NoSignal { name, available } if available.is_empty() => {
-            Words::new(format!("no signal \"{name}\""))
+            CauseText::new(format!("no signal \"{name}\""))
         }
         ReadFailure::NoSignal { name, available } => {
-            Words::new(format!("no signal \"{name}\" (it has: {})", available.join(", ")))
+            CauseText::new(format!("no signal \"{name}\" (it has: {})", available.join(", ")))
         }
-        ReadFailure::NoStatus { signal } => Words::new(format!("{signal} has no status object")),
+        ReadFailure::NoStatus { signal } => CauseText::new(format!("{signal} has no status object")),
         ReadFailure::NotConvertible { signal, from: None, .. } => {
-            Words::new(format!("{signal} has no unit: it cannot be converted"))
+            CauseText::new(format!("{signal} has no unit: it cannot be converted"))
         }
         ReadFailure::NotConvertible { signal, from: Some(from), to } => {
-            Words::new(format!("{signal} is in {from}, which does not convert to {to}"))
+            CauseText::new(format!("{signal} is in {from}, which does not convert to {to}"))
         }
         ReadFailure::NotNumber { signal } => {
-            let words = Words::new(format!("{signal} is text or bytes, not a number"));
+            let words = CauseText::new(format!("{signal} is text or bytes, not a number"));
             match failure.node {
                 Some(node) => words.hint(format!("cangauge sdo read {node} {signal}")),
                 None => words,
             }
         }
         ReadFailure::TypeUnknown { signal, raw } => {
-            let words = Words::new(format!("{} (received {})", unknown_type(signal), spaced_bytes(raw.bytes())));
+            let words = CauseText::new(format!("{} (received {})", unknown_type(signal), spaced_bytes(raw.bytes())));
             match failure.node {
                 Some(node) => words.hint(type_remedy(node, signal)),
                 None => words,
             }
         }
         ReadFailure::Invalid { signal, status } => {
-            Words::new(format!("{signal} has no valid value: {}", status.map_or("invalid", Status::as_str)))
+            CauseText::new(format!("{signal} has no valid value: {}", status.map_or("invalid", Status::as_str)))
         }
     }
 }

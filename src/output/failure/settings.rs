@@ -1,6 +1,6 @@
 //! Text for causes, effects and notes: a setting could not be shown or changed, and reports about a change.
 
-use super::Words;
+use super::CauseText;
 use crate::device::unit::Unit;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
@@ -8,32 +8,33 @@ use crate::tasks::settings::unit::list;
 use crate::tasks::settings::{QuantityError, SettingsEffect, SettingsFact, SettingsFailure};
 
 /// The message and the hint for a cause.
-pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> Words {
+pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> CauseText {
     match cause {
         SettingsFailure::WhichSignal { available } => {
-            Words::new(format!("choose a signal (it has: {})", available.join(", ")))
+            CauseText::new(format!("choose a signal (it has: {})", available.join(", ")))
         }
         SettingsFailure::NoErrorObjects => {
-            Words::new("it has neither an error register (1001h) nor an error history (1003h)")
+            CauseText::new("it has neither an error register (1001h) nor an error history (1003h)")
         }
-        SettingsFailure::NoErrorHistory => Words::new("it has no error history (1003h)"),
-        SettingsFailure::HistoryNotCleared { count } => {
-            Words::new(format!("it acknowledged the write of 0x1003:0, but the history still has {}", errors(*count)))
-        }
+        SettingsFailure::NoErrorHistory => CauseText::new("it has no error history (1003h)"),
+        SettingsFailure::HistoryNotCleared { count } => CauseText::new(format!(
+            "it acknowledged the write of 0x1003:0, but the history still has {}",
+            errors(*count)
+        )),
         SettingsFailure::NoChannel { signal } => {
-            Words::new(format!("{signal} is not a CiA 404 channel: it has no such setting"))
+            CauseText::new(format!("{signal} is not a CiA 404 channel: it has no such setting"))
         }
-        SettingsFailure::NoUnit { signal } => Words::new(format!("{} has no unit (6131h)", of(signal.as_ref()))),
+        SettingsFailure::NoUnit { signal } => CauseText::new(format!("{} has no unit (6131h)", of(signal.as_ref()))),
         SettingsFailure::UnitFixed { signal, unit } => {
-            Words::new(format!("{signal} is in {unit}, which the device cannot change"))
+            CauseText::new(format!("{signal} is in {unit}, which the device cannot change"))
         }
         SettingsFailure::UnitNotAccepted { signal, unit, accepted } => unit_not_accepted(signal, *unit, accepted),
-        SettingsFailure::NoMinMax => Words::new("no object with minimum and maximum is known for this device"),
+        SettingsFailure::NoMinMax => CauseText::new("no object with minimum and maximum is known for this device"),
         SettingsFailure::NoMinMaxReset { signal } => {
-            Words::new(format!("no object that resets minimum and maximum of {signal} is known for this device"))
+            CauseText::new(format!("no object that resets minimum and maximum of {signal} is known for this device"))
         }
         SettingsFailure::MinMaxNotReset { signal } => {
-            Words::new(format!("it acknowledged the reset, but minimum and maximum of {signal} are unchanged"))
+            CauseText::new(format!("it acknowledged the reset, but minimum and maximum of {signal} are unchanged"))
         }
         SettingsFailure::NoLimits { .. }
         | SettingsFailure::NoSuchLimit { .. }
@@ -57,8 +58,8 @@ fn errors(count: u64) -> String {
     if count == 1 { "1 error".to_owned() } else { format!("{count} errors") }
 }
 
-fn unit_not_accepted(signal: &str, unit: Unit, accepted: &[Unit]) -> Words {
-    let words = Words::new(format!("{signal} accepts {}, not {unit}", list(accepted)));
+fn unit_not_accepted(signal: &str, unit: Unit, accepted: &[Unit]) -> CauseText {
+    let words = CauseText::new(format!("{signal} accepts {}, not {unit}", list(accepted)));
     let swapped = Unit(unit.0.swap_bytes());
     match accepted.contains(&swapped) {
         true => words.hint(format!("0x{:08X} is {swapped} in wire order: use 0x{:08X}", unit.0, swapped.0)),
@@ -66,16 +67,16 @@ fn unit_not_accepted(signal: &str, unit: Unit, accepted: &[Unit]) -> Words {
     }
 }
 
-fn of_limits(cause: &SettingsFailure) -> Words {
+fn of_limits(cause: &SettingsFailure) -> CauseText {
     match cause {
         SettingsFailure::NoLimits { signal, objects: [first, last] } => {
-            Words::new(format!("{signal} has no delta and no limits ({first} to {last})"))
+            CauseText::new(format!("{signal} has no delta and no limits ({first} to {last})"))
         }
         SettingsFailure::NoSuchLimit { signal, limit, object } => {
-            Words::new(format!("{signal} has no {} ({object})", limit.as_str()))
+            CauseText::new(format!("{signal} has no {} ({object})", limit.as_str()))
         }
         SettingsFailure::LimitsCrossed { signal, lower, upper } => {
-            Words::new(format!("{signal}: the lower limit {lower} is above the upper limit {upper}"))
+            CauseText::new(format!("{signal}: the lower limit {lower} is above the upper limit {upper}"))
         }
         SettingsFailure::LimitValue { signal, limit, error } => {
             let reason = match error {
@@ -84,29 +85,30 @@ fn of_limits(cause: &SettingsFailure) -> Words {
                 }
                 QuantityError::Value(error) => error.to_string(),
             };
-            Words::new(format!("{signal} {}: {reason}", limit.as_str()))
+            CauseText::new(format!("{signal} {}: {reason}", limit.as_str()))
         }
-        _ => Words::default(),
+        _ => CauseText::default(),
     }
 }
 
-fn of_filter(cause: &SettingsFailure) -> Words {
+fn of_filter(cause: &SettingsFailure) -> CauseText {
     match cause {
         SettingsFailure::NoFilter { signal } => {
-            Words::new(format!("{} has no filter (61A0h, 61A1h)", of(signal.as_ref())))
+            CauseText::new(format!("{} has no filter (61A0h, 61A1h)", of(signal.as_ref())))
         }
         SettingsFailure::FilterConstant { signal, constant } => {
-            Words::new(format!("{signal} does not accept the filter constant {constant}"))
+            CauseText::new(format!("{signal} does not accept the filter constant {constant}"))
         }
         SettingsFailure::FilterType { signal, wanted, available, doubt } => {
             let available: Vec<String> =
                 available.iter().map(|(code, meaning)| format!("{meaning} ({code})")).collect();
             let available = available.join(", ");
-            let words = Words::new(format!("{signal} has no filter type \"{}\" (it has: {available})", wanted.word()));
+            let words =
+                CauseText::new(format!("{signal} has no filter type \"{}\" (it has: {available})", wanted.word()));
             if doubt.is_empty() { words } else { words.hint(format!("61A0h: {doubt}")) }
         }
         SettingsFailure::NoDamping { signal } => {
-            Words::new(format!("no object that sets a damping of {signal} is known for this device"))
+            CauseText::new(format!("no object that sets a damping of {signal} is known for this device"))
                 .hint("set the filter constant instead: --constant N")
         }
         SettingsFailure::DampingOfOtherType { signal, present } => {
@@ -114,10 +116,11 @@ fn of_filter(cause: &SettingsFailure) -> Words {
                 Some(present) => format!("the filter is: {present}"),
                 None => "--type sets another filter".to_owned(),
             };
-            Words::new(format!("{signal}: a damping needs the moving average ({present})")).hint("add --type moving")
+            CauseText::new(format!("{signal}: a damping needs the moving average ({present})"))
+                .hint("add --type moving")
         }
-        SettingsFailure::DampingTooLong => Words::new("the damping is limited to 65535 ms"),
-        _ => Words::default(),
+        SettingsFailure::DampingTooLong => CauseText::new("the damping is limited to 65535 ms"),
+        _ => CauseText::default(),
     }
 }
 

@@ -1,58 +1,60 @@
 //! Text for causes, effects and notes of `store` and `restore`.
 
-use super::Words;
+use super::CauseText;
 use super::node::shown;
 use crate::canopen::id::NodeId;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
-use crate::tasks::store::{Difference, Group, Snapshot, StoreEffect, StoreFact, StoreFailure, Verb};
+use crate::tasks::store::{Difference, Group, Snapshot, StoreCommand, StoreEffect, StoreFact, StoreFailure};
 
 /// The message and the hint for a cause.
-pub(super) fn words(failure: &Failure, cause: &StoreFailure) -> Words {
+pub(super) fn words(failure: &Failure, cause: &StoreFailure) -> CauseText {
     let object = failure.object.map(|object| object.to_string()).unwrap_or_default();
     match cause {
-        StoreFailure::NotOnCommand { verb: Verb::Store, bits } if bits & 2 != 0 => Words::new(format!(
+        StoreFailure::NotOnCommand { command: StoreCommand::Store, bits } if bits & 2 != 0 => CauseText::new(format!(
             "the device stores automatically, not on command ({object} reads 0x{bits:08X}): nothing was stored"
         )),
-        StoreFailure::NotOnCommand { verb, bits } => Words::new(format!(
+        StoreFailure::NotOnCommand { command, bits } => CauseText::new(format!(
             "the device does not {} on command ({object} reads 0x{bits:08X}): nothing was {}",
-            name(*verb),
-            done(*verb)
+            name(*command),
+            done(*command)
         )),
-        StoreFailure::NoGroup { verb, group: Group::All, .. } => {
-            Words::new(format!("the device cannot {} (no {object}): nothing was {}", name(*verb), done(*verb)))
-        }
-        StoreFailure::NoGroup { verb, group, .. } => {
-            let words = Words::new(format!(
+        StoreFailure::NoGroup { command, group: Group::All, .. } => CauseText::new(format!(
+            "the device cannot {} (no {object}): nothing was {}",
+            name(*command),
+            done(*command)
+        )),
+        StoreFailure::NoGroup { command, group, .. } => {
+            let words = CauseText::new(format!(
                 "the device cannot {} group {} (no {object}): nothing was {}",
-                name(*verb),
+                name(*command),
                 group.as_str(),
-                done(*verb)
+                done(*command)
             ));
             match failure.node {
-                Some(node) => words.hint(format!("{} everything: cangauge {0} {node}", name(*verb))),
+                Some(node) => words.hint(format!("{} everything: cangauge {0} {node}", name(*command))),
                 None => words,
             }
         }
-        StoreFailure::CapabilityUnreadable { verb, code } => {
-            let (name, done) = (name(*verb), done(*verb));
-            Words::new(format!(
+        StoreFailure::CapabilityUnreadable { command, code } => {
+            let (name, done) = (name(*command), done(*command));
+            CauseText::new(format!(
                 "it is unknown whether the device can {name} ({object} cannot be read: {code}): nothing was {done}"
             ))
         }
-        StoreFailure::NotKept(changed) => {
+        StoreFailure::ChangedAtReset(changed) => {
             let change = |change: &Difference| {
                 let now = change.found.as_ref().map_or_else(|| "not readable".to_owned(), |now| shown(&now.value()));
                 format!("{} was {} and is {now}", label(&change.expected), shown(&change.expected.value()))
             };
-            Words::new(format!("settings changed at the reset: {}", list(changed, change)))
+            CauseText::new(format!("settings changed at the reset: {}", list(changed, change)))
         }
         StoreFailure::NotDefault(wrong) => {
             let wrong_value = |wrong: &Difference| {
                 let now = wrong.found.as_ref().map_or_else(|| "not readable".to_owned(), |now| shown(&now.value()));
                 format!("{} is {now} instead of {}", label(&wrong.expected), shown(&wrong.expected.value()))
             };
-            Words::new(format!("restored and reset, but not at the defaults: {}", list(wrong, wrong_value)))
+            CauseText::new(format!("restored and reset, but not at the defaults: {}", list(wrong, wrong_value)))
         }
     }
 }
@@ -60,23 +62,23 @@ pub(super) fn words(failure: &Failure, cause: &StoreFailure) -> Words {
 /// The text for an effect.
 pub(in crate::output) fn effect(node: &str, effect: &StoreEffect) -> NoteText {
     match effect {
-        StoreEffect::SignatureSent { verb, group } => {
-            let (signature, object) = (verb.signature(), verb.object(*group));
-            let (unknown, verify) = match verb {
-                Verb::Store => ("whether the settings were stored", "--verify"),
-                Verb::Restore => ("whether the next reset sets the defaults", "--reset"),
+        StoreEffect::SignatureSent { command, group } => {
+            let (signature, object) = (command.signature(), command.object(*group));
+            let (unknown, verify) = match command {
+                StoreCommand::Store => ("whether the settings were stored", "--verify"),
+                StoreCommand::Restore => ("whether the next reset sets the defaults", "--reset"),
             };
             let message =
                 format!("\"{signature}\" was sent to {object} once and is not repeated; it is unknown {unknown}");
-            let command = format!("cangauge {} {node} --group {} {verify}", name(*verb), group.as_str());
+            let command = format!("cangauge {} {node} --group {} {verify}", name(*command), group.as_str());
             NoteText::new("signature-sent", message).command("repeat and verify", command)
         }
         StoreEffect::Answers(true) => NoteText::new("answers", "the device answers other requests"),
         StoreEffect::Answers(false) => NoteText::new("no-answer", "the device no longer answers"),
         StoreEffect::Stored(groups) => NoteText::new("stored", format!("stored: {}", Group::names(groups))),
-        StoreEffect::NotVerified(verb) => NoteText::new(
+        StoreEffect::NotVerified(command) => NoteText::new(
             "not-verified",
-            format!("the device acknowledged the {}; the result was not verified", name(*verb)),
+            format!("the device acknowledged the {}; the result was not verified", name(*command)),
         ),
     }
 }
@@ -131,17 +133,17 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> NoteTex
     }
 }
 
-fn name(verb: Verb) -> &'static str {
-    match verb {
-        Verb::Store => "store",
-        Verb::Restore => "restore",
+fn name(command: StoreCommand) -> &'static str {
+    match command {
+        StoreCommand::Store => "store",
+        StoreCommand::Restore => "restore",
     }
 }
 
-fn done(verb: Verb) -> &'static str {
-    match verb {
-        Verb::Store => "stored",
-        Verb::Restore => "restored",
+fn done(command: StoreCommand) -> &'static str {
+    match command {
+        StoreCommand::Store => "stored",
+        StoreCommand::Restore => "restored",
     }
 }
 

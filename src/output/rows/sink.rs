@@ -64,7 +64,7 @@ impl RowSink {
         if self.is_complete() {
             return Ok(());
         }
-        let elapsed = self.elapsed.get_or_insert_default().take(at);
+        let elapsed = self.elapsed.get_or_insert_default().advance(at);
         let columns = values.columns();
         self.prepare_file(elapsed, columns)?;
         let start = self.block.len();
@@ -180,6 +180,6 @@ impl RowSink {
 
     /// Time between the first row and `at`; `None` before the first row.
     pub(super) fn elapsed(&self, at: Stamp) -> Option<Duration> {
-        self.elapsed.as_ref().map(|elapsed| elapsed.look(at))
+        self.elapsed.as_ref().map(|elapsed| elapsed.at(at))
     }
 }

@@ -85,11 +85,11 @@ fn mistakes_in_a_file_have_their_line() {
 
 /// Frames up to `until`.
 fn hear(bus: &mut MemoryBus, until: Duration) -> Vec<String> {
-    let mut heard = Vec::new();
+    let mut texts = Vec::new();
     while let Ok(Event::Frame(received)) = bus.receive(Mono::at(until)) {
-        heard.push(received.frame.to_string());
+        texts.push(received.frame.to_string());
     }
-    heard
+    texts
 }
 
 #[test]

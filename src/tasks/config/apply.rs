@@ -342,7 +342,7 @@ impl Work<'_, '_> {
             .collect();
         match settings.is_empty() {
             true => Ok(()),
-            false => Err(Failure::at(self.now.node.id, ConfigFailure::NotKept { settings, is_after_reset })),
+            false => Err(Failure::at(self.now.node.id, ConfigFailure::ReadBackDiffers { settings, is_after_reset })),
         }
     }
 

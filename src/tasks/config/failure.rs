@@ -35,7 +35,7 @@ pub enum ConfigFailure {
         place: Place,
     },
     /// Settings do not have the written values.
-    NotKept {
+    ReadBackDiffers {
         /// Key, value of the file, value of the device.
         settings: Vec<(String, Item, Option<Item>)>,
         /// Whether the device was reset before.
@@ -126,7 +126,7 @@ impl ConfigFailure {
             ConfigFailure::NotOneDevice { nodes, .. } if nodes.is_empty() => Kind::NoAnswer,
             ConfigFailure::NotPluggedIn { .. } => Kind::NoAnswer,
             ConfigFailure::NotOneDevice { .. } | ConfigFailure::NoNodeId { .. } => Kind::CheckFailed,
-            ConfigFailure::NotKept { .. } => Kind::Unexpected,
+            ConfigFailure::ReadBackDiffers { .. } => Kind::Unexpected,
             ConfigFailure::Journal { .. } => Kind::Io,
         }
     }

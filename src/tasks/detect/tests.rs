@@ -155,8 +155,8 @@ fn listening_finds_the_bit_rate_and_restores_the_interface() {
     for rate in RATES {
         let mut wire = Wire::at(rate);
         let found = run(&mut wire, false).unwrap();
-        assert_eq!(found.found, Some((rate, By::Frames)));
-        assert!(found.tried.iter().all(|tried| tried.how == How::Listening));
+        assert_eq!(found.found, Some((rate, Evidence::Frames)));
+        assert!(found.tried.iter().all(|tried| tried.how == Method::Listening));
         assert_eq!(wire.log.first().map(String::as_str), Some("500000 ListenOnly"), "the present bit rate comes first");
         assert_eq!(wire.log.last().map(String::as_str), Some("back"));
         assert!(wire.sent.is_empty());
@@ -181,10 +181,10 @@ fn no_bit_rate_without_evidence() {
 fn lone_device_is_asked_after_listening() {
     let mut wire = Wire { third_node: false, heartbeat: false, ..Wire::at(125_000) };
     let found = run(&mut wire, true).unwrap();
-    assert_eq!(found.found, Some((125_000, By::Frames)));
-    let how: Vec<How> = found.tried.iter().map(|tried| tried.how).collect();
-    assert_eq!(how[..RATES.len()], [How::Listening; RATES.len()]);
-    assert!(how[RATES.len()..].iter().all(|&how| how == How::Asking));
+    assert_eq!(found.found, Some((125_000, Evidence::Frames)));
+    let how: Vec<Method> = found.tried.iter().map(|tried| tried.how).collect();
+    assert_eq!(how[..RATES.len()], [Method::Listening; RATES.len()]);
+    assert!(how[RATES.len()..].iter().all(|&how| how == Method::Asking));
     assert!(wire.sent.iter().all(|(_, frame)| frame.to_string().ends_with("#4000100000000000")));
     assert_eq!(wire.log.last().map(String::as_str), Some("back"));
 }
@@ -192,13 +192,13 @@ fn lone_device_is_asked_after_listening() {
 #[test]
 fn acknowledge_alone_is_evidence() {
     let mut wire = Wire { third_node: false, heartbeat: false, answers: false, ..Wire::at(100_000) };
-    assert_eq!(run(&mut wire, true).unwrap().found, Some((100_000, By::Acknowledge)));
+    assert_eq!(run(&mut wire, true).unwrap().found, Some((100_000, Evidence::Acknowledge)));
 }
 
 #[test]
 fn device_that_sends_is_not_asked() {
     let mut wire = Wire::at(10_000);
-    assert_eq!(run(&mut wire, true).unwrap().found, Some((10_000, By::Frames)));
+    assert_eq!(run(&mut wire, true).unwrap().found, Some((10_000, Evidence::Frames)));
     assert!(wire.sent.is_empty());
 }
 
@@ -206,7 +206,7 @@ fn device_that_sends_is_not_asked() {
 fn unsupported_bit_rates_and_modes() {
     let mut wire = Wire { impossible: Some(500_000), ..Wire::at(100_000) };
     let found = run(&mut wire, false).unwrap();
-    assert_eq!(found.found, Some((100_000, By::Frames)));
+    assert_eq!(found.found, Some((100_000, Evidence::Frames)));
     assert_eq!(found.tried[0].impossible.as_deref(), Some("no"));
 
     let mut no_listen_only = Wire { listens: false, ..Wire::at(100_000) };
@@ -215,7 +215,7 @@ fn unsupported_bit_rates_and_modes() {
     let expected = HostFailure::Unsupported { reason: "can9 has no listen-only mode".into(), action };
     assert!(matches!(&failure.cause, Cause::Host(cause) if *cause == expected), "{failure:?}");
     assert_eq!(no_listen_only.log, ["back"]);
-    assert_eq!(run(&mut no_listen_only, true).unwrap().found, Some((100_000, By::Frames)));
+    assert_eq!(run(&mut no_listen_only, true).unwrap().found, Some((100_000, Evidence::Frames)));
 }
 
 #[test]

@@ -42,7 +42,7 @@ impl Findings {
 }
 
 /// The objects to read of a node, to find out why these TPDOs are not sent.
-pub fn questions(node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Vec<ObjectId> {
+pub fn objects_to_read(node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Vec<ObjectId> {
     let mut objects = vec![ObjectId::DEVICE_TYPE];
     let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
     for tpdo in valid.filter(|tpdo| tpdo.mapping.is_empty() || carries(tpdo)) {

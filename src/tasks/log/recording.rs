@@ -25,7 +25,7 @@ use crate::measure::layout::Tpdo;
 use crate::measure::sample::{Doubt, Sample};
 use crate::node::Node;
 use crate::tasks::Failure;
-use crate::tasks::diagnosis::Heard;
+use crate::tasks::diagnosis::ObservedFrames;
 use crate::tasks::synced::SyncedTpdos;
 use due::DueTpdos;
 use emergencies::Emergencies;
@@ -87,7 +87,7 @@ pub(super) struct Recording<'o> {
     /// Nodes whose heartbeats were reported to have a wrong length.
     heartbeat_length_reported: BTreeSet<NodeId>,
     /// The last messages of each node.
-    pub(super) heard: BTreeMap<NodeId, Heard>,
+    pub(super) observed: BTreeMap<NodeId, ObservedFrames>,
     pub(super) remarks: Vec<Remark>,
     /// The reported doubts about sources.
     doubts: BTreeSet<(usize, Doubt)>,
@@ -135,7 +135,7 @@ impl<'o> Recording<'o> {
             started: bus.mono(),
             wrong_length_reported: BTreeSet::new(),
             heartbeat_length_reported: BTreeSet::new(),
-            heard: BTreeMap::new(),
+            observed: BTreeMap::new(),
             remarks: Vec::new(),
             doubts: BTreeSet::new(),
             interrupted: false,

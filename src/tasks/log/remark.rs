@@ -5,7 +5,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::pdo::TpdoNumber;
 use crate::master::{SdoError, SecondAnswer};
-use crate::measure::expression::bind::BareLimit;
+use crate::measure::expression::bind::LimitWithoutUnit;
 use crate::measure::layout::NarrowValue;
 use crate::measure::sample::Doubt;
 use crate::tasks::Failure;
@@ -57,7 +57,7 @@ pub enum Remark {
     /// A value of this signal is missing or may be wrong.
     Doubt(NodeId, String, Doubt),
     /// A limit of an expression has no unit.
-    BareLimit(BareLimit),
+    LimitWithoutUnit(LimitWithoutUnit),
     /// The values of a signal may be clipped.
     MayClip(NodeId, NarrowValue),
     /// The node, or only this signal, sent no measurements for this reason.

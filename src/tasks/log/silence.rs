@@ -10,7 +10,9 @@ use crate::master::Master;
 use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use crate::tasks::Failure;
-use crate::tasks::diagnosis::{Findings, Heard, Inquiry, Silence, SilenceCause, Situation, diagnose, questions};
+use crate::tasks::diagnosis::{
+    Findings, Inquiry, ObservedFrames, RequestContext, Silence, SilenceCause, diagnose, objects_to_read,
+};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -60,7 +62,7 @@ pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Fa
             let nodes = vec![(node, Silence::of(SilenceCause::SameCobId(id, [one, other])))];
             return Failure::at(node, LogFailure::NoMeasurements { within, nodes });
         }
-        let state = |node: &NodeId| recording.heard.get(node).and_then(|heard| heard.state);
+        let state = |node: &NodeId| recording.observed.get(node).and_then(|observed| observed.state);
         let nodes = options.nodes.iter().map(|node| (*node, state(node))).collect();
         let (has_traffic, interface) = (recording.has_traffic, recording.interface.clone());
         return Failure::general(LogFailure::NothingReceived { within, nodes, has_traffic, interface });
@@ -120,21 +122,22 @@ impl Recording<'_> {
             return of_recording(SilenceCause::NoTpdo);
         };
         let carries = |tpdo: &Tpdo| self.carries(silent, tpdo);
-        let (heard, wrong_length) = (self.heard.get(&id).copied().unwrap_or_default(), self.decoder.wrong_length(id));
-        let heard = Heard {
-            sends_tpdos: heard.sends_tpdos || self.has_sent(id) || wrong_length.is_some(),
+        let (observed, wrong_length) =
+            (self.observed.get(&id).copied().unwrap_or_default(), self.decoder.wrong_length(id));
+        let observed = ObservedFrames {
+            sends_tpdos: observed.sends_tpdos || self.has_sent(id) || wrong_length.is_some(),
             wrong_length,
             shared: self.shared_cob_id(node, &carries),
             syncs: self.syncs_received.get(&node.sync).copied().unwrap_or_default(),
-            ..heard
+            ..observed
         };
-        let situation = Situation {
+        let context = RequestContext {
             waited: self.waited(),
             syncs_sent: matches!(self.options.mode, Mode::Sync(_)).then(|| self.syncs()),
             requests: matches!(self.options.mode, Mode::Request(_)),
             was_started: self.states.has_started(id),
         };
-        let silence = diagnose(node, &carries, &heard, self.questions.findings.get(&id), &situation);
+        let silence = diagnose(node, &carries, &observed, self.questions.findings.get(&id), &context);
         Silence { unknown_cob_ids: self.unknown_cob_ids.iter().copied().collect(), ..silence }
     }
 
@@ -161,14 +164,14 @@ impl Recording<'_> {
     }
 
     /// The objects to read from silent nodes. Polled nodes are not asked: the polls already show the reason.
-    fn questions(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
+    fn objects_to_read(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
         if matches!(self.options.mode, Mode::Poll(_) | Mode::Passive) || !self.link_is_up || self.interface.is_none() {
             return Vec::new();
         }
         let mut asked: BTreeMap<NodeId, Vec<_>> = BTreeMap::new();
         for silent in self.silent() {
             let Some(node) = self.nodes.iter().find(|node| node.id == silent.node()) else { continue };
-            let objects = questions(node, &|tpdo| self.carries(silent, tpdo));
+            let objects = objects_to_read(node, &|tpdo| self.carries(silent, tpdo));
             let known = asked.entry(node.id).or_default();
             let new: Vec<_> = objects.into_iter().filter(|object| !known.contains(object)).collect();
             known.extend(new);
@@ -179,7 +182,7 @@ impl Recording<'_> {
     /// Reads objects of the silent nodes during a recording. The reasons are reported after all answers.
     pub(super) fn read_silent_nodes_during_recording(&mut self, master: &mut Master<'_>) {
         self.questions.were_asked = true;
-        let asked = self.questions();
+        let asked = self.objects_to_read();
         if !asked.is_empty() {
             self.questions.open = Some(Inquiry::begin(master, &asked));
         }
@@ -188,12 +191,13 @@ impl Recording<'_> {
     /// Reads objects of the silent nodes at the end of a recording. If the bus fails meanwhile, the reasons are less
     /// exact, but the recording does not fail.
     pub(super) fn ask_silent_nodes(&mut self, master: &mut Master<'_>) {
-        let asked = self.questions();
+        let asked = self.objects_to_read();
         if asked.is_empty() || self.is_interrupted() || self.rows() > 0 && self.is_short() {
             return;
         }
-        let is_unknown =
-            |node: &NodeId| !self.has_sent(*node) && self.heard.get(node).is_none_or(|heard| heard.state.is_none());
+        let is_unknown = |node: &NodeId| {
+            !self.has_sent(*node) && self.observed.get(node).is_none_or(|observed| observed.state.is_none())
+        };
         let guarded: Vec<NodeId> = asked.iter().map(|(node, _)| *node).filter(is_unknown).collect();
         if let Ok(findings) = Inquiry::complete(master, &asked, &guarded) {
             self.questions.findings.extend(findings);

@@ -187,7 +187,7 @@ pub(super) fn taken(master: &mut Master<'_>, node: NodeId, start: Mono) -> Resul
     let timeout = master.timing().timeout.min(LISTEN_TIME / 3);
     let sign = |master: &Master<'_>| match () {
         () if master.has_answered_since(node, start) => Some(TakenSign::Answer),
-        () if master.has_lived_since(node, start) => Some(TakenSign::Heartbeat),
+        () if master.has_heartbeat_since(node, start) => Some(TakenSign::Heartbeat),
         () => None,
     };
     let mut until = start + LISTEN_TIME;
@@ -214,7 +214,7 @@ fn ask_twice(master: &mut Master<'_>, node: NodeId, timeout: Duration) -> Result
     let mut open = tickets.len();
     wait(master, start + MAX_TRANSFER_TIME, Policy::Command, |master, event| {
         open -= usize::from(matches!(event, Happening::Sdo(ticket, _) if tickets.contains(&ticket)));
-        let is_found = master.has_answered_since(node, start) || master.has_lived_since(node, start);
+        let is_found = master.has_answered_since(node, start) || master.has_heartbeat_since(node, start);
         if open == 0 || is_found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     master.forget(tickets.into_iter());

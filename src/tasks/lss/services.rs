@@ -54,8 +54,8 @@ pub fn inquire(
 fn unless_silent<T>(result: Result<T, LssError>, others: &mut Vec<LssError>) -> Result<Option<T>, LssError> {
     match result {
         Ok(answer) => Ok(Some(answer)),
-        Err(error @ LssError::NoAnswer { heard, .. }) => {
-            others.extend(heard.map(|_| error));
+        Err(error @ LssError::NoAnswer { received, .. }) => {
+            others.extend(received.map(|_| error));
             Ok(None)
         }
         Err(error) => Err(error),

@@ -74,7 +74,7 @@ pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) ->
         journal.remove(&temporary);
     }
     let milliseconds = match &restored {
-        Err(Error::NotKept { found, .. }) => found.as_u64().and_then(|time| u16::try_from(time).ok()),
+        Err(Error::ReadBackDiffers { found, .. }) => found.as_u64().and_then(|time| u16::try_from(time).ok()),
         _ => None,
     };
     let is_certain = milliseconds.is_some() || set.is_ok() && !is_acknowledged;
@@ -100,7 +100,7 @@ fn restore(master: &mut Master<'_>, node: &Node, before: u16) -> (Result<(), Err
     };
     let mut result = attempt(master);
     for _ in 0..MAX_ATTEMPTS {
-        if !matches!(result, Err(Error::Interrupted | Error::NotKept { .. })) {
+        if !matches!(result, Err(Error::Interrupted | Error::ReadBackDiffers { .. })) {
             break;
         }
         result = attempt(master);

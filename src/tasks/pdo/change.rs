@@ -160,7 +160,7 @@ impl Change<'_, '_> {
     fn read_back(&mut self, wanted: &Settings) -> Result<(), StepError> {
         let found = Settings::read(&mut self.session, wanted.number, wanted.inhibit_100us.is_some())?;
         match found.difference(wanted) {
-            Some((object, found, written)) => Err(StepError::NotKept { object, found, written }),
+            Some((object, found, written)) => Err(StepError::ReadBackDiffers { object, found, written }),
             None if self.session.has_restarted => Err(StepError::Restarted),
             None => Ok(()),
         }
@@ -175,7 +175,10 @@ impl Change<'_, '_> {
             match self.restore(error) {
                 Ok(Restored::New) => {
                     // No note is needed for a lost answer, or for Ctrl-C after the last step.
-                    if matches!(error, StepError::Rejected(_) | StepError::Restarted | StepError::NotKept { .. }) {
+                    if matches!(
+                        error,
+                        StepError::Rejected(_) | StepError::Restarted | StepError::ReadBackDiffers { .. }
+                    ) {
                         let (error, write) = (error.clone(), self.failed_at.clone());
                         self.note(PdoFact::SetDespite { number: self.old.number, error, write });
                     }

@@ -175,7 +175,7 @@ pub enum StepError {
     /// The step could not be recorded in the journal, so it was not sent.
     NotRecorded(JournalError),
     /// The device acknowledged a write, but has another value.
-    NotKept {
+    ReadBackDiffers {
         /// The object.
         object: ObjectId,
         /// The number that was read back.
@@ -191,7 +191,7 @@ impl StepError {
         match self {
             StepError::Rejected(_) => Kind::Refused,
             StepError::Lost(error) => Cause::Sdo(Box::new(error.clone())).kind(),
-            StepError::Restarted | StepError::NotKept { .. } => Kind::Unexpected,
+            StepError::Restarted | StepError::ReadBackDiffers { .. } => Kind::Unexpected,
             StepError::Interrupted => Kind::Interrupted,
             StepError::NotRecorded(_) => Kind::Io,
             StepError::Bus(error) => Cause::Bus(Arc::clone(error)).kind(),
@@ -202,7 +202,7 @@ impl StepError {
     pub fn object(&self) -> Option<ObjectId> {
         match self {
             StepError::Rejected(error) | StepError::Lost(error) => Some(error.object),
-            StepError::NotKept { object, .. } => Some(*object),
+            StepError::ReadBackDiffers { object, .. } => Some(*object),
             StepError::Restarted | StepError::Interrupted | StepError::NotRecorded(_) | StepError::Bus(_) => None,
         }
     }
@@ -284,7 +284,7 @@ pub enum PdoFact {
         number: TpdoNumber,
     },
     /// The device does not store the settings of the TPDO.
-    NotKept {
+    LostAtPowerOff {
         /// The TPDO.
         number: TpdoNumber,
     },
@@ -383,7 +383,7 @@ pub(super) fn not_read(node: NodeId, available: Vec<TpdoNumber>, error: StepErro
         StepError::Interrupted => Failure::general(Cause::Interrupted),
         StepError::Bus(error) => Failure::general(Cause::Bus(error)),
         // Only writes are recorded and read back.
-        StepError::Restarted | StepError::NotKept { .. } | StepError::NotRecorded(_) => {
+        StepError::Restarted | StepError::ReadBackDiffers { .. } | StepError::NotRecorded(_) => {
             Failure::at(node, PdoFailure::Restarted)
         }
     }

@@ -89,12 +89,12 @@ pub(super) fn check_others(session: &mut Session<'_, '_>, id: CanId) -> Result<(
         return Err(Failure::at(node, PdoFailure::Occupied { id, by: CobIdUser::Other(*other, name) }));
     }
     let until = master.now() + LISTEN_TIMEOUT;
-    let heard = wait(master, until, Policy::Command, |_, event| match event {
+    let received = wait(master, until, Policy::Command, |_, event| match event {
         Happening::Frame(received) if received.frame.id() == id => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
     })?;
     master.listen_to(&[node])?;
-    match heard.done() {
+    match received.done() {
         Some(()) => Err(Failure::at(node, PdoFailure::Occupied { id, by: CobIdUser::Traffic })),
         None => Ok(()),
     }

@@ -83,7 +83,7 @@ pub fn map(
     }
     notes.extend(of_change);
     if writes > 0 && node.model.as_deref().is_some_and(|model| !is_stored(model, number)) {
-        notes.push(note(PdoFact::NotKept { number }));
+        notes.push(note(PdoFact::LostAtPowerOff { number }));
     }
     Ok(MapReport { shown: TpdoReport::new(&node, wanted), writes, stored: stored.is_some(), notes })
 }

@@ -16,7 +16,7 @@ use crate::node::survey::{BackgroundSurvey, SETUP_TIMEOUT, survey_each};
 use crate::node::wait::{Policy, Until, Waiter, run};
 use crate::node::{Node, Overrides};
 use crate::tasks::Failure;
-use crate::tasks::diagnosis::{Findings, Heard, Inquiry, Silence, Situation, diagnose, questions};
+use crate::tasks::diagnosis::{Findings, Inquiry, ObservedFrames, RequestContext, Silence, diagnose, objects_to_read};
 use crate::tasks::log::{LogFailure, SetupListener, changes, compare_values, is_constant};
 use crate::tasks::synced::{Surplus, SyncedTpdos};
 use std::collections::{BTreeMap, BTreeSet};
@@ -140,7 +140,7 @@ struct Watcher<'a> {
     numbers: BTreeMap<CanId, TpdoNumber>,
     synced: SyncedTpdos,
     /// Other frames of the nodes, and the time of their last heartbeat.
-    heard: BTreeMap<NodeId, (Heard, Mono)>,
+    observed: BTreeMap<NodeId, (ObservedFrames, Mono)>,
     /// The reads from silent nodes.
     inquiry: Option<Inquiry>,
     overrides: Overrides,
@@ -173,7 +173,7 @@ impl<'a> Watcher<'a> {
             decoder: Decoder::default(),
             numbers: BTreeMap::new(),
             synced: SyncedTpdos::default(),
-            heard: BTreeMap::new(),
+            observed: BTreeMap::new(),
             inquiry: None,
             overrides: Overrides::default(),
             rereads: BTreeMap::new(),
@@ -340,43 +340,43 @@ impl<'a> Watcher<'a> {
     fn on_other_frame(&mut self, received: &Received) -> ControlFlow<()> {
         let (frame, now) = (&received.frame, received.at.mono);
         for node in self.nodes.iter().filter(|node| node.sync == frame.id() && !frame.is_remote()) {
-            let (heard, _) = self.heard.entry(node.id).or_default();
-            heard.syncs = (heard.syncs.0 + 1, frame.data().len());
+            let (observed, _) = self.observed.entry(node.id).or_default();
+            observed.syncs = (observed.syncs.0 + 1, frame.data().len());
         }
         let emergency = Emergency::parse(frame).filter(|emergency| emergency.code != 0);
         if let Some(node) = self.nodes.iter().find(|node| node.emergency == frame.id())
             && let Some(emergency) = emergency
         {
-            self.heard.entry(node.id).or_default().0.emergency = Some(emergency.code);
+            self.observed.entry(node.id).or_default().0.emergency = Some(emergency.code);
         }
         let Some((id, life)) = Life::parse(frame) else { return ControlFlow::Continue(()) };
         if !self.nodes.iter().any(|node| node.id == id) {
             return ControlFlow::Continue(());
         }
-        let (heard, last) = self.heard.entry(id).or_default();
+        let (observed, last) = self.observed.entry(id).or_default();
         *last = now;
-        heard.booted = life == Life::BootUp;
-        heard.state = if let Life::State(state) = life { Some(state) } else { None };
-        if heard.booted { (self.on_event)(&WatchEvent::Restarted(id)) } else { ControlFlow::Continue(()) }
+        observed.booted = life == Life::BootUp;
+        observed.state = if let Life::State(state) = life { Some(state) } else { None };
+        if observed.booted { (self.on_event)(&WatchEvent::Restarted(id)) } else { ControlFlow::Continue(()) }
     }
 
     /// Why the nodes send no TPDOs.
     fn silences(&self, findings: &BTreeMap<NodeId, Findings>, now: Mono) -> Vec<(NodeId, Silence)> {
-        let situation =
-            Situation { waited: now.since(self.start), syncs_sent: None, requests: false, was_started: false };
+        let context =
+            RequestContext { waited: now.since(self.start), syncs_sent: None, requests: false, was_started: false };
         let silence = |node: &Node| {
-            let (mut heard, last) = self.heard.get(&node.id).copied().unwrap_or_default();
+            let (mut observed, last) = self.observed.get(&node.id).copied().unwrap_or_default();
             let period = node.heartbeat_ms.map(|period| Duration::from_millis(period.into()));
-            heard.heartbeat_stopped = period.is_some_and(|period| {
+            observed.heartbeat_stopped = period.is_some_and(|period| {
                 !period.is_zero() && now.since(last.max(self.start)) > period * 2 + HEARTBEAT_TOLERANCE
             });
-            (node.id, diagnose(node, &has_mapped_object, &heard, findings.get(&node.id), &situation))
+            (node.id, diagnose(node, &has_mapped_object, &observed, findings.get(&node.id), &context))
         };
         self.nodes.iter().map(silence).collect()
     }
 
-    fn questions(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
-        self.nodes.iter().map(|node| (node.id, questions(node, &has_mapped_object))).collect()
+    fn objects_to_read(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
+        self.nodes.iter().map(|node| (node.id, objects_to_read(node, &has_mapped_object))).collect()
     }
 
     /// The result at the end.
@@ -392,9 +392,10 @@ impl<'a> Watcher<'a> {
             return Err(Failure::general(PdoFailure::NothingReceived { nodes: Vec::new() }));
         }
         let now = master.now();
-        let is_unknown = |node: &&Node| self.heard.get(&node.id).is_none_or(|(heard, _)| heard.state.is_none());
+        let is_unknown =
+            |node: &&Node| self.observed.get(&node.id).is_none_or(|(observed, _)| observed.state.is_none());
         let guarded: Vec<NodeId> = self.nodes.iter().filter(is_unknown).map(|node| node.id).collect();
-        let findings = Inquiry::complete(master, &self.questions(), &guarded)?;
+        let findings = Inquiry::complete(master, &self.objects_to_read(), &guarded)?;
         Err(Failure::general(PdoFailure::NothingReceived { nodes: self.silences(&findings, now) }))
     }
 }
@@ -420,7 +421,7 @@ impl Waiter for Watcher<'_> {
             Happening::Deadline => {
                 self.next = self.end;
                 if !self.has_received {
-                    self.inquiry = Some(Inquiry::begin(master, &self.questions()));
+                    self.inquiry = Some(Inquiry::begin(master, &self.objects_to_read()));
                 }
                 ControlFlow::Continue(())
             }

@@ -1,7 +1,7 @@
 //! Causes, effects and notes of `store` and `restore`.
 
 use super::snapshot::Snapshot;
-use super::{Group, Verb};
+use super::{Group, StoreCommand};
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::tasks::Kind;
@@ -12,14 +12,14 @@ pub enum StoreFailure {
     /// According to 1010h or 1011h, the device does not support the command.
     NotOnCommand {
         /// The command.
-        verb: Verb,
+        command: StoreCommand,
         /// The value of the object.
         bits: u64,
     },
     /// The device has no object for this group.
     NoGroup {
         /// The command.
-        verb: Verb,
+        command: StoreCommand,
         /// The group.
         group: Group,
         /// The abort code.
@@ -28,12 +28,12 @@ pub enum StoreFailure {
     /// The device rejects the read of its capability.
     CapabilityUnreadable {
         /// The command.
-        verb: Verb,
+        command: StoreCommand,
         /// The abort code.
         code: AbortCode,
     },
     /// After the reset, these settings have other values than before.
-    NotKept(Vec<Difference>),
+    ChangedAtReset(Vec<Difference>),
     /// After the reset, these settings do not have their defaults.
     NotDefault(Vec<Difference>),
 }
@@ -54,7 +54,7 @@ impl StoreFailure {
             StoreFailure::NotOnCommand { .. }
             | StoreFailure::NoGroup { .. }
             | StoreFailure::CapabilityUnreadable { .. } => Kind::Refused,
-            StoreFailure::NotKept(_) | StoreFailure::NotDefault(_) => Kind::Unexpected,
+            StoreFailure::ChangedAtReset(_) | StoreFailure::NotDefault(_) => Kind::Unexpected,
         }
     }
 
@@ -73,7 +73,7 @@ pub enum StoreEffect {
     /// The signature was sent once. It is unknown whether the device executed it.
     SignatureSent {
         /// The command.
-        verb: Verb,
+        command: StoreCommand,
         /// The group.
         group: Group,
     },
@@ -82,7 +82,7 @@ pub enum StoreEffect {
     /// These groups were stored before the failure.
     Stored(Vec<Group>),
     /// The device acknowledged the signature, but its effect was not verified.
-    NotVerified(Verb),
+    NotVerified(StoreCommand),
 }
 
 /// Notes about a store or restore.

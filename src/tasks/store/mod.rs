@@ -27,19 +27,19 @@ const STORE_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// A command for the settings of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verb {
+pub enum StoreCommand {
     /// Store the settings.
     Store,
     /// Restore the factory defaults.
     Restore,
 }
 
-impl Verb {
+impl StoreCommand {
     /// The object for the command of a group: 1010h or 1011h.
     pub fn object(self, group: Group) -> ObjectId {
         let index = match self {
-            Verb::Store => 0x1010,
-            Verb::Restore => 0x1011,
+            StoreCommand::Store => 0x1010,
+            StoreCommand::Restore => 0x1011,
         };
         ObjectId::new(index, group.sub())
     }
@@ -47,8 +47,8 @@ impl Verb {
     /// The signature for the object.
     pub fn signature(self) -> &'static str {
         match self {
-            Verb::Store => "save",
-            Verb::Restore => "load",
+            StoreCommand::Store => "save",
+            StoreCommand::Restore => "load",
         }
     }
 }
@@ -163,7 +163,7 @@ pub fn plan(master: &mut Master<'_>, device: &Node, group: Group) -> Result<Stor
         vec![Group::Communication, Group::Application]
     };
     for &group in &groups {
-        check_capability(master, device, Verb::Store, group)?;
+        check_capability(master, device, StoreCommand::Store, group)?;
     }
     if group == Group::All {
         let lost = snapshot::not_stored(master, device)?;
@@ -202,7 +202,7 @@ pub fn carry_out(
         None
     };
     for (done, &group) in plan.groups.iter().enumerate() {
-        send(master, device, Verb::Store, group).map_err(|failure| match &plan.groups[..done] {
+        send(master, device, StoreCommand::Store, group).map_err(|failure| match &plan.groups[..done] {
             [] => failure,
             stored => failure.with(node, StoreEffect::Stored(stored.to_vec())),
         })?;
@@ -211,7 +211,7 @@ pub fn carry_out(
     let Some((before, state)) = before else { return Ok(report) };
     let compare = |master: &mut Master<'_>| compare(master, device, &before);
     let ((), note) = snapshot::reset(master, node, state, compare)
-        .map_err(|failure| failure.with(node, StoreEffect::NotVerified(Verb::Store)))?;
+        .map_err(|failure| failure.with(node, StoreEffect::NotVerified(StoreCommand::Store)))?;
     report.notes.extend(note);
     if before.is_empty() {
         report.notes.push(Note::of_node(node, StoreFact::NothingCompared));
@@ -226,23 +226,23 @@ pub fn carry_out(
 pub(super) fn check_capability(
     master: &mut Master<'_>,
     device: &Node,
-    verb: Verb,
+    command: StoreCommand,
     group: Group,
 ) -> Result<(), Failure> {
-    let object = verb.object(group);
+    let object = command.object(group);
     let cause = match master.read(device.id, object, DataType::Unsigned(4))? {
         Ok(bits) => {
             let bits = bits.as_u64().unwrap_or(0);
             match bits & 1 {
                 1 => return Ok(()),
-                _ => StoreFailure::NotOnCommand { verb, bits },
+                _ => StoreFailure::NotOnCommand { command, bits },
             }
         }
         // The capability is unknown, and the device may accept the command.
         Err(SdoError { failure: SdoFailure::Refused(AbortCode::WRITE_ONLY), .. }) => return Ok(()),
         Err(SdoError { failure: SdoFailure::Refused(code), .. }) => match code {
-            AbortCode::NO_SUB_INDEX | AbortCode::NO_OBJECT => StoreFailure::NoGroup { verb, group, code },
-            _ => StoreFailure::CapabilityUnreadable { verb, code },
+            AbortCode::NO_SUB_INDEX | AbortCode::NO_OBJECT => StoreFailure::NoGroup { command, group, code },
+            _ => StoreFailure::CapabilityUnreadable { command, code },
         },
         Err(error) => return Err(error.into()),
     };
@@ -274,12 +274,12 @@ fn custom_cob_ids(master: &mut Master<'_>, device: &Node) -> Result<Vec<(ObjectI
 }
 
 /// Sends the signature of a command once.
-pub(super) fn send(master: &mut Master<'_>, device: &Node, verb: Verb, group: Group) -> Result<(), Failure> {
+pub(super) fn send(master: &mut Master<'_>, device: &Node, command: StoreCommand, group: Group) -> Result<(), Failure> {
     use node::Error as NodeError;
     let (progress, watch) = (&mut |_| {}, &mut |_: &Received| {});
     let mut options = WriteOptions { min_timeout: STORE_TIMEOUT, ..WriteOptions::new(progress, watch) };
-    let object = verb.object(group);
-    let error = match write_with(master, device, object, verb.signature().as_bytes(), &mut options) {
+    let object = command.object(group);
+    let error = match write_with(master, device, object, command.signature().as_bytes(), &mut options) {
         Ok(_) => return Ok(()),
         Err(error) => error,
     };
@@ -289,7 +289,7 @@ pub(super) fn send(master: &mut Master<'_>, device: &Node, verb: Verb, group: Gr
     if !may_have_acted {
         return Err(failure);
     }
-    let failure = failure.with(device.id, StoreEffect::SignatureSent { verb, group });
+    let failure = failure.with(device.id, StoreEffect::SignatureSent { command, group });
     match is_silent.then(|| answers(master, device)).flatten() {
         Some(answers) => Err(failure.with(device.id, StoreEffect::Answers(answers))),
         None => Err(failure),
@@ -312,5 +312,5 @@ fn compare(master: &mut Master<'_>, device: &Node, before: &[Snapshot]) -> Resul
         found: after.iter().find(|other| other.object == setting.object).cloned(),
     };
     let changed: Vec<Difference> = before.iter().filter(differs).map(difference).collect();
-    if changed.is_empty() { Ok(()) } else { Err(Failure::at(device.id, StoreFailure::NotKept(changed))) }
+    if changed.is_empty() { Ok(()) } else { Err(Failure::at(device.id, StoreFailure::ChangedAtReset(changed))) }
 }

@@ -131,12 +131,12 @@ fn answer_to_store_is_reported() {
         // The answer to another service is ignored.
         (
             &[0x11, 0, 0, 0, 0, 0, 0, 0],
-            "LSS store configuration: no answer within 3 s; heard 7E4#1100000000000000",
+            "LSS store configuration: no answer within 3 s; received 7E4#1100000000000000",
             Some(Kind::NoAnswer),
         ),
         (
             &[0x44, 0, 0, 0, 0, 0, 0, 0],
-            "LSS store configuration: no answer within 3 s; heard 7E4#4400000000000000",
+            "LSS store configuration: no answer within 3 s; received 7E4#4400000000000000",
             Some(Kind::NoAnswer),
         ),
     ] {

@@ -87,13 +87,13 @@ impl Recording<'_> {
             let state = (!command.is_reset() && state != NmtState::Operational).then_some(state);
             let addressed =
                 self.nodes.iter().map(|known| known.id).filter(|&known| node.is_none_or(|node| node == known));
-            addressed.for_each(|node| self.heard.entry(node).or_default().commanded = state);
+            addressed.for_each(|node| self.observed.entry(node).or_default().commanded = state);
         } else if !frame.is_remote() && self.nodes.iter().any(|node| node.sync == frame.id()) {
             let (count, length) = self.syncs_received.entry(frame.id()).or_default();
             (*count, *length) = (*count + 1, frame.data().len());
         } else if let Some((node, _)) = self.decoder.mapped_length(frame.id()).filter(|_| !frame.is_remote()) {
             // Its mapping is unknown.
-            self.heard.entry(node).or_default().sends_tpdos = true;
+            self.observed.entry(node).or_default().sends_tpdos = true;
         } else if self.receives_all && self.is_unknown_tpdo(frame) {
             self.unknown_cob_ids.insert(frame.id());
         }
@@ -102,7 +102,7 @@ impl Recording<'_> {
     /// Whether this may be a TPDO of a recorded node with another COB-ID than in 180xh:1. TPDOs of other nodes that
     /// send heartbeats are excluded.
     fn is_unknown_tpdo(&self, frame: &Frame) -> bool {
-        let is_of_other = |of: NodeId| self.heard.contains_key(&of) && self.nodes.iter().all(|node| node.id != of);
+        let is_of_other = |of: NodeId| self.observed.contains_key(&of) && self.nodes.iter().all(|node| node.id != of);
         matches!(frame.id(), CanId::Standard(0x181..=0x57f))
             && !frame.is_remote()
             && !predefined_tpdo(frame).is_some_and(is_of_other)
@@ -132,7 +132,7 @@ impl Recording<'_> {
         }
         self.tally.emergencies += 1;
         if emergency.code != 0 {
-            self.heard.entry(node).or_default().emergency = Some(emergency.code);
+            self.observed.entry(node).or_default().emergency = Some(emergency.code);
         }
         if !self.emergencies.is_new(node, emergency, at.mono) {
             return;
@@ -168,14 +168,14 @@ impl Recording<'_> {
             listener.forget(node, &mut self.decoder);
             self.update_sources();
         }
-        let heard = self.heard.entry(node).or_default();
-        (heard.booted, heard.heartbeat_stopped) = (is_boot_up, false);
-        heard.commanded = heard.commanded.filter(|_| !is_boot_up);
-        heard.state = match life {
+        let observed = self.observed.entry(node).or_default();
+        (observed.booted, observed.heartbeat_stopped) = (is_boot_up, false);
+        observed.commanded = observed.commanded.filter(|_| !is_boot_up);
+        observed.state = match life {
             Life::State(state) => Some(state),
             Life::BootUp => None,
         };
-        heard.was_operational |= heard.state == Some(NmtState::Operational);
+        observed.was_operational |= observed.state == Some(NmtState::Operational);
         if !self.liveness.has(node) {
             return;
         }
@@ -444,7 +444,7 @@ impl Recording<'_> {
         }
         while let Some((node, silence)) = self.liveness.next_lost_heartbeat(now) {
             self.tally.events.heartbeat_losses += 1;
-            self.heard.entry(node).or_default().heartbeat_stopped = true;
+            self.observed.entry(node).or_default().heartbeat_stopped = true;
             observer.event(&LogEvent::HeartbeatLost(node, silence), master.bus().now());
         }
     }

@@ -75,15 +75,15 @@ impl Recording<'_> {
     /// The nodes with values that left OPERATIONAL according to their last heartbeat.
     fn not_operational(&self) -> Vec<Remark> {
         let remark = |node: NodeId| {
-            let heard = self.heard.get(&node)?;
-            let state = heard.state.filter(|&state| state != NmtState::Operational)?;
-            let was_operational = heard.was_operational || self.poll.is_none();
+            let observed = self.observed.get(&node)?;
+            let state = observed.state.filter(|&state| state != NmtState::Operational)?;
+            let was_operational = observed.was_operational || self.poll.is_none();
             let cause = SilenceCause::NotOperational {
                 state,
                 by: Proof::Heartbeat,
                 was_started: self.states.has_started(node),
             };
-            let silence = Silence { emergency: heard.emergency, ..Silence::of(cause) };
+            let silence = Silence { emergency: observed.emergency, ..Silence::of(cause) };
             (was_operational && self.has_sent(node)).then(|| Remark::NotOperational(node, Box::new(silence)))
         };
         self.liveness.nodes().filter_map(remark).collect()

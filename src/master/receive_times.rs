@@ -1,4 +1,4 @@
-//! The last signs of life on the bus, for proofs that need several seconds of silence.
+//! The times of the last frames of each node, for proofs that need several seconds of silence.
 //!
 //! A command asks or listens in several steps. What it received in one step counts in the next ones too.
 
@@ -8,33 +8,33 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss::Fastscan;
 use crate::canopen::nmt::Life;
 
-/// The last moments of one node.
+/// The times of the last frames of one node.
 #[derive(Clone, Copy, Debug, Default)]
-struct Moments {
+struct Times {
     /// Its last heartbeat or boot-up message.
-    life: Option<Mono>,
+    heartbeat: Option<Mono>,
     /// Its last SDO answer.
     answer: Option<Mono>,
     /// The last two requests to it, the latest one first.
     asked: [Option<Mono>; 2],
 }
 
-/// The signs of life of all nodes and of LSS slaves without a node-ID.
+/// The times of the last frames of all nodes, and of LSS slaves without a node-ID.
 #[derive(Debug)]
-pub(super) struct Heard {
-    nodes: Box<[Moments; 128]>,
+pub(super) struct ReceiveTimes {
+    nodes: Box<[Times; 128]>,
     /// The last answer to a fastscan request.
     fastscan: Option<Mono>,
 }
 
-impl Default for Heard {
-    fn default() -> Heard {
-        Heard { nodes: Box::new([Moments::default(); 128]), fastscan: None }
+impl Default for ReceiveTimes {
+    fn default() -> ReceiveTimes {
+        ReceiveTimes { nodes: Box::new([Times::default(); 128]), fastscan: None }
     }
 }
 
-impl Heard {
-    fn node(&mut self, node: NodeId) -> &mut Moments {
+impl ReceiveTimes {
+    fn node(&mut self, node: NodeId) -> &mut Times {
         &mut self.nodes[usize::from(node.get())]
     }
 
@@ -44,7 +44,7 @@ impl Heard {
         if let Some(node) = frame.id().sdo_response_node() {
             self.node(node).answer = Some(at);
         } else if let Some((node, _)) = Life::parse(frame) {
-            self.node(node).life = Some(at);
+            self.node(node).heartbeat = Some(at);
         } else if frame.id() == CanId::LSS_SLAVE && Fastscan::is_answer(frame) {
             self.fastscan = Some(at);
         }
@@ -60,23 +60,23 @@ impl Heard {
 impl Master<'_> {
     /// Whether a heartbeat or a boot-up message of a node was received at this moment or later. The filters must let it
     /// pass: all filters of [`Master::listen_to`] with this node do.
-    pub fn has_lived_since(&self, node: NodeId, since: Mono) -> bool {
-        self.sdo.heard.nodes[usize::from(node.get())].life >= Some(since)
+    pub fn has_heartbeat_since(&self, node: NodeId, since: Mono) -> bool {
+        self.sdo.receive_times.nodes[usize::from(node.get())].heartbeat >= Some(since)
     }
 
     /// Whether an SDO answer of a node was received at this moment or later, also if its transfer was over by then.
     pub fn has_answered_since(&self, node: NodeId, since: Mono) -> bool {
-        self.sdo.heard.nodes[usize::from(node.get())].answer >= Some(since)
+        self.sdo.receive_times.nodes[usize::from(node.get())].answer >= Some(since)
     }
 
     /// When the node was asked for the last time, if it was asked at least twice since this moment.
     pub fn asked_twice_since(&self, node: NodeId, since: Mono) -> Option<Mono> {
-        let [last, before] = self.sdo.heard.nodes[usize::from(node.get())].asked;
+        let [last, before] = self.sdo.receive_times.nodes[usize::from(node.get())].asked;
         last.filter(|_| before >= Some(since))
     }
 
     /// Whether a slave answered a fastscan request at this moment or later.
     pub(super) fn has_fastscan_answer_since(&self, since: Mono) -> bool {
-        self.sdo.heard.fastscan >= Some(since)
+        self.sdo.receive_times.fastscan >= Some(since)
     }
 }
