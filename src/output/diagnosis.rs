@@ -12,7 +12,9 @@ use std::time::Duration;
 pub fn reason(silence: &Silence) -> String {
     let text = match &silence.cause {
         SilenceCause::InterfaceDown => return "the interface is down".to_owned(),
-        SilenceCause::NotReadAgain => return "it restarted, and its setup could not be read again".to_owned(),
+        SilenceCause::NotReadAgain => {
+            return "it restarted or its heartbeat paused, and its setup could not be read again".to_owned();
+        }
         SilenceCause::PollFailed(error) => return error.to_string(),
         SilenceCause::NotOperational { state, by, was_started } => {
             let again = match (was_started, state) {

@@ -368,6 +368,24 @@ fn lost_heartbeat_and_changed_state_are_reported() {
     assert!(kept.notes.contains(&LogEvent::ReadAgain(node(5), Vec::new())), "a boot-up may have been missed");
 }
 
+/// A busy device: its heartbeats pause again and again, and a survey takes longer than the time between two pauses.
+#[test]
+fn heartbeats_that_pause_often_do_not_end_the_rows() {
+    let text = format!("clock = \"virtual\"\n{MH4}latency = \"40ms\"\nset = {{ \"0x1017\" = 50 }}\n");
+    let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
+    let is_lost = |received: &Received| {
+        let millis = received.at.mono.since_start().as_millis();
+        received.frame.id() == CanId::heartbeat(node(5)) && millis > 2000 && millis % 400 > 100
+    };
+    let mut bus = UnstableBus { is_lost, ..UnstableBus::new(inner, &[]) };
+    let mut kept = RecordedRows::default();
+    let mode = Mode::Poll(Duration::from_millis(100));
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(mode), &mut kept).expect("a recording");
+    assert!(outcome.events.heartbeat_losses > 3, "{:?}", outcome.events);
+    let time = |row: &String| row.split(',').next().and_then(|time| time.parse::<u64>().ok()).expect("a time");
+    assert!(kept.rows.iter().any(|row| time(row) > 3_000_000), "{:#?}", kept.rows);
+}
+
 /// A bus whose interface reports the given events at the given times.
 struct UnstableBus {
     inner: MemoryBus,

@@ -34,6 +34,9 @@ const WRONG_LENGTH_INTERVAL: Duration = Duration::from_secs(60);
 pub(super) enum RereadReason {
     /// The node restarted, or nothing could be received from it for a while. It may need a start command.
     Disconnected,
+    /// Its heartbeat paused, so a boot-up message may be lost. It may need a start command. A survey in progress goes
+    /// on: heartbeats of a busy device can pause more often than a survey takes.
+    HeartbeatPaused,
     /// Another master wrote an object that its TPDOs depend on.
     Written,
     /// The length of a TPDO differs from its mapping, so the TPDO was ignored. Other TPDOs are still recorded.
@@ -85,7 +88,7 @@ impl Rereads {
         }
     }
 
-    /// Requests that a node is read again. A survey in progress is restarted. Returns `false` if no reread is needed.
+    /// Requests that a node is read again. A survey in progress is restarted in most cases. Returns `false` if no reread is needed.
     pub(super) fn request(&mut self, node: NodeId, why: RereadReason, now: Mono, master: &mut Master<'_>) -> bool {
         if why == RereadReason::WrongLength {
             if self.wrong_lengths.get(&node).is_some_and(|&before| now.since(before) < WRONG_LENGTH_INTERVAL) {
@@ -103,10 +106,18 @@ impl Rereads {
             });
             return true;
         }
+        if why == RereadReason::HeartbeatPaused
+            && let Some(pending) = self.pending.get_mut(&node)
+            && pending.survey.is_some()
+            && pending.recorded_since.is_none()
+        {
+            pending.may_need_start = true;
+            return true;
+        }
         let delay = if why == RereadReason::Written { WRITE_SETTLE_TIME } else { Duration::ZERO };
         let pending = self.pending.entry(node).or_insert_with(new);
         pending.due = now + delay;
-        pending.may_need_start |= why == RereadReason::Disconnected;
+        pending.may_need_start |= matches!(why, RereadReason::Disconnected | RereadReason::HeartbeatPaused);
         if why != RereadReason::WrongLength {
             pending.recorded_since = None;
         }

@@ -183,7 +183,7 @@ impl Recording<'_> {
             HeartbeatChange::None => {}
             HeartbeatChange::Back => {
                 observer.event(&LogEvent::HeartbeatBack(node), at);
-                self.request_reread(node, RereadReason::Disconnected, at.mono, master);
+                self.request_reread(node, RereadReason::HeartbeatPaused, at.mono, master);
             }
             // This is the expected state.
             HeartbeatChange::State(NmtState::Operational) => {}
