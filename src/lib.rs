@@ -22,7 +22,8 @@
 //!   without the encoders of the client.
 //! - [`tasks`] → node, measure, master, device, canopen, bus (the trait). The procedures of the commands: set a
 //!   node-ID, map a TPDO, record, check. They return typed reports and typed failures, and print nothing.
-//! - [`publish`] → bus (files, moments, interrupts). The form of recorded rows outside of the bench: line protocol.
+//! - [`publish`] → bus (files, moments). Sends recordings to databases and brokers, in threads of its own. The names and
+//!   cells of recordings and line protocol are always built, the rest with the feature `publish`.
 //! - [`output`] → tasks (reports), publish (reports), node, measure, device, canopen (values), bus (moments, faults).
 //!   All sentences, tables and file formats. Part of the feature `cli`.
 //! - [`cli`] → tasks, output, publish, node, measure, master, sim, bus, device, canopen (values). Arguments and help

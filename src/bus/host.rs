@@ -34,10 +34,15 @@ fn full_name() -> Option<String> {
 pub fn new_run_id(start: Wall) -> String {
     let time = humantime::format_rfc3339_seconds(start.system_time()).to_string();
     let time: String = time.chars().filter(char::is_ascii_alphanumeric).collect();
+    format!("{}-{}", time.trim_end_matches('Z'), random_word())
+}
+
+/// Eight random hexadecimal digits. They are not secret.
+pub fn random_word() -> String {
     // The standard library seeds each hasher from the random numbers of the system.
     let mut hasher = RandomState::new().build_hasher();
     hasher.write_u32(std::process::id());
-    format!("{}-{:08x}", time.trim_end_matches('Z'), hasher.finish() >> 32)
+    format!("{:08x}", hasher.finish() >> 32)
 }
 
 #[cfg(test)]

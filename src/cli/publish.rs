@@ -10,6 +10,7 @@ use crate::bus::time::{HostClock, Mono};
 use crate::output::publish::{self as texts, PublishState};
 use crate::output::report::Stream;
 use crate::publish::influx::Influx;
+use crate::publish::mqtt::Mqtt;
 use crate::publish::position::{Stored, all_of, file_name};
 use crate::publish::publisher::{Options, Progress, PublishEvent, Publisher};
 use crate::publish::service::Service;
@@ -41,7 +42,7 @@ const END_TIMEOUT: Duration = Duration::from_secs(3);
 /// The environment variable with the token.
 const TOKEN: &str = "CANGAUGE_TOKEN";
 
-/// Send recordings of log to a time-series database
+/// Send recordings of log to a time-series database or an MQTT broker
 ///
 /// The recording is the spool: publish reads its files, sends the rows in batches, and saves its position only after the
 /// server has acknowledged them. It continues there after a restart of the server, of the program or of the computer.
@@ -50,6 +51,7 @@ const TOKEN: &str = "CANGAUGE_TOKEN";
 Servers:
   influx://HOST[:8086]/DATABASE    InfluxDB 1 and databases with its protocol
   influx://HOST[:8086]/ORG/BUCKET  InfluxDB 2
+  mqtt://HOST[:1883][/PREFIX]      MQTT 3.1.1, QoS 1 [default prefix: cangauge]
 
 Files:
   run.csv.SERVER.pos       the position (see --status)
@@ -58,6 +60,7 @@ Files:
 Examples:
   cangauge publish run.csv --to influx://lab1/benches
   cangauge publish run.csv --to influx://lab1/benches --follow --tag bench=3
+  cangauge publish run.csv --to mqtt://broker1 --follow
   cangauge publish run.csv --status")]
 pub(crate) struct Publish {
     /// Recordings of log: CSV or JSON Lines. For run.csv, also run-0001.csv, run-0002.csv and so on are sent
@@ -177,6 +180,7 @@ impl Publish {
 fn sink(target: &Target, secret: Option<&Secret>, timeout: Duration) -> Box<dyn Sink> {
     match target.scheme {
         Scheme::Influx => Box::new(Influx::new(target, secret, timeout)),
+        Scheme::Mqtt => Box::new(Mqtt::new(target, secret, timeout)),
     }
 }
 

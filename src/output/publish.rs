@@ -134,7 +134,6 @@ pub fn trouble_text(trouble: &Trouble) -> String {
         Trouble::Status(status, words) => format!("{words} (HTTP status {status})"),
         Trouble::RejectsEverything(words) => format!("the server rejects every row: {words}"),
         Trouble::Refused(code) => format!("the broker refuses the connection (return code {code})"),
-        Trouble::Tls(reason) => format!("no secure connection: {reason}"),
     }
 }
 
@@ -166,7 +165,7 @@ fn trouble_hint(trouble: &Trouble) -> Option<&'static str> {
 fn trouble_kind(trouble: &Trouble) -> Kind {
     match trouble {
         Trouble::NoConnection(_) | Trouble::Timeout | Trouble::Closed => Kind::NoAnswer,
-        Trouble::Garbage | Trouble::NotDatabase(_) | Trouble::Tls(_) => Kind::Unexpected,
+        Trouble::Garbage | Trouble::NotDatabase(_) => Kind::Unexpected,
         _ => Kind::Refused,
     }
 }
@@ -215,6 +214,8 @@ pub fn failure(progress: &Progress, error: &PublishError) -> ErrorMessage {
         PublishError::Position(path, PositionError::Io(error)) => {
             ErrorMessage::new(Kind::Io, format!("write {}: {error}", path.display()))
         }
+        PublishError::Panicked => ErrorMessage::new(Kind::Unexpected, format!("{file}: the publisher failed"))
+            .hint("start it again: it continues at its position"),
         PublishError::Read(error) => ErrorMessage::new(Kind::Io, format!("read {file}: {error}")),
         PublishError::Rejects(path, error) => ErrorMessage::new(Kind::Io, format!("write {}: {error}", path.display())),
         PublishError::Server(trouble) => {
@@ -238,7 +239,7 @@ pub fn rejected(progress: &Progress, rejects: &Path) -> Option<ErrorMessage> {
 
 /// A wrong address. The address is not shown, because it may contain a secret.
 pub fn target_error(error: TargetError) -> ErrorMessage {
-    let forms = "use influx://HOST[:8086]/DATABASE or influx://HOST[:8086]/ORGANISATION/BUCKET";
+    let forms = "use influx://HOST/DATABASE, influx://HOST/ORGANISATION/BUCKET or mqtt://HOST";
     let (message, hint) = match error {
         TargetError::Credentials => (
             "--to must not contain a user name or a password: other users can see the command line",
@@ -250,6 +251,11 @@ pub fn target_error(error: TargetError) -> ErrorMessage {
         TargetError::Scheme => ("--to has an unknown kind of server", forms),
         TargetError::Host => ("--to has no valid host and port", forms),
         TargetError::Database => ("--to names no database", forms),
+        TargetError::Tls => (
+            "--to needs TLS, which this program does not contain",
+            "use influx:// or mqtt:// in a trusted network, or through a tunnel (ssh -L)",
+        ),
+        TargetError::Topic => ("--to contains a wildcard of MQTT", forms),
     };
     ErrorMessage::usage(message).hint(hint)
 }

@@ -1,10 +1,10 @@
 //! InfluxDB line protocol over HTTP: InfluxDB 1 (`/write`) and 2 (`/api/v2/write`), and databases that accept the same.
 
 use super::line_protocol::{Line, head, push_line};
-use super::sink::{Record, Rejection, SendError, Sink, Trouble};
+use super::sink::{Record, Rejection, SendError, Sink, Trouble, io_trouble};
 use super::target::{Secret, Target, percent_encoded};
 use crate::bus::Wall;
-use std::io::{self, Read};
+use std::io::Read;
 use std::time::Duration;
 use ureq::Agent;
 use ureq::http::StatusCode;
@@ -115,14 +115,7 @@ fn trouble(error: &ureq::Error) -> Trouble {
         ureq::Error::Timeout(_) => Trouble::Timeout,
         ureq::Error::HostNotFound => Trouble::NoConnection("the host is unknown".to_owned()),
         ureq::Error::ConnectionFailed => Trouble::NoConnection("the connection failed".to_owned()),
-        ureq::Error::Io(error) => match error.kind() {
-            io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => Trouble::Timeout,
-            io::ErrorKind::UnexpectedEof
-            | io::ErrorKind::ConnectionReset
-            | io::ErrorKind::ConnectionAborted
-            | io::ErrorKind::BrokenPipe => Trouble::Closed,
-            _ => Trouble::NoConnection(words(&error.to_string())),
-        },
+        ureq::Error::Io(error) => io_trouble(error),
         _ => Trouble::Garbage,
     }
 }

@@ -13,6 +13,8 @@ pub mod cells;
 pub mod influx;
 pub mod line_protocol;
 #[cfg(feature = "publish")]
+pub mod mqtt;
+#[cfg(feature = "publish")]
 pub mod position;
 #[cfg(feature = "publish")]
 pub mod publisher;

@@ -121,8 +121,7 @@ impl<S: Sink> Publisher<S> {
             Some(position) => position.header.clone(),
             None => spool.first_line(),
         };
-        let is_new = position.is_none();
-        let mut position = position.unwrap_or_default();
+        let (is_new, mut position) = (position.is_none(), position.unwrap_or_default());
         url.clone_into(&mut position.url);
         if let Some(place) = spool.place() {
             position.set_place(place, &header);
@@ -130,6 +129,7 @@ impl<S: Sink> Publisher<S> {
         let mut publisher = Publisher {
             recording: recording.to_owned(),
             options,
+            most_rows: sink.most_rows(),
             sink,
             spool,
             reader: RowReader::after(&header),
@@ -145,14 +145,24 @@ impl<S: Sink> Publisher<S> {
             rejected_now: 0,
             retry: Retry::default(),
             has_accepted: false,
-            most_rows: usize::MAX,
         };
+        publisher.announce();
         if is_new {
             // A start at the end must not move if this publisher is killed before it sends a row.
             publisher.position.state = "ok".to_owned();
             publisher.store(now)?;
         }
         Ok(publisher)
+    }
+
+    /// Tells the sink the bench before the first row, if it is known.
+    fn announce(&mut self) {
+        self.runs.refresh();
+        let run = self.spool.place().and_then(|place| self.runs.at(&place.file, place.offset));
+        let own = self.options.tags.iter().find(|(key, _)| key == "bench").map(|(_, bench)| bench);
+        if let Some(bench) = own.or(run.map(|run| &run.bench)).filter(|bench| !bench.is_empty()) {
+            self.sink.announce(bench);
+        }
     }
 
     /// The events since the last call.
@@ -219,9 +229,16 @@ impl<S: Sink> Publisher<S> {
             if !self.options.follow {
                 return Ok(Step::Done);
             }
-            if let Err(trouble) = self.sink.idle(now.mono) {
-                self.set_trouble(trouble, None, now)?;
-            }
+            match self.sink.idle() {
+                Err(trouble) => self.set_trouble(trouble, None, now)?,
+                Ok(()) if self.retry.trouble.is_some() => {
+                    self.recover();
+                    "ok".clone_into(&mut self.position.state);
+                    self.store(now.wall)?;
+                    Step::Again
+                }
+                Ok(()) => Step::Again,
+            };
             return Ok(Step::Wait(POLL_INTERVAL));
         };
         let mut batch = Box::new(self.batch(chunk));
@@ -302,6 +319,7 @@ impl<S: Sink> Publisher<S> {
             tags,
             identities: identities.collect(),
         };
+        self.sink.announce(&self.origin.bench);
         self.origin_of = Some((generation, run.cloned()));
     }
 

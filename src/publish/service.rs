@@ -6,7 +6,7 @@ use crate::bus::time::HostClock;
 use crate::bus::{Mono, Wall};
 use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 /// The interval at which a busy publisher reports its progress.
@@ -62,6 +62,7 @@ pub struct News {
 #[derive(Debug)]
 pub struct Service {
     shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
 }
 
 impl Service {
@@ -73,27 +74,34 @@ impl Service {
         let shared = Arc::new(Shared::default());
         let first = publishers.iter().map(|publisher| Report { progress: publisher.progress(), ..Report::default() });
         shared.reports().extend(first);
+        let mut threads = Vec::new();
         for (number, publisher) in publishers.into_iter().enumerate() {
             let shared = Arc::clone(&shared);
-            thread::Builder::new().stack_size(STACK_SIZE).spawn(move || run(number, publisher, &shared, clock))?;
+            let builder = thread::Builder::new().stack_size(STACK_SIZE);
+            threads.push(builder.spawn(move || run(number, publisher, &shared, clock))?);
         }
-        Ok(Service { shared })
+        Ok(Service { shared, threads })
     }
 
     /// The news of each recording, in their order.
     pub fn news(&self) -> Vec<News> {
         let mut reports = self.shared.reports();
-        let news = reports.iter_mut().map(|report| News {
-            progress: report.progress.clone(),
-            events: std::mem::take(&mut report.events),
-            end: report.end.take(),
+        let news = reports.iter_mut().zip(&self.threads).map(|(report, thread)| {
+            if thread.is_finished() && !std::mem::replace(&mut report.has_ended, true) {
+                report.end = Some(Err(PublishError::Panicked));
+            }
+            News {
+                progress: report.progress.clone(),
+                events: std::mem::take(&mut report.events),
+                end: report.end.take(),
+            }
         });
         news.collect()
     }
 
     /// Whether all publishers have ended.
     pub fn has_ended(&self) -> bool {
-        self.shared.reports().iter().all(|report| report.has_ended)
+        self.threads.iter().all(JoinHandle::is_finished)
     }
 
     /// Asks the publishers to end after their present request.
@@ -134,6 +142,14 @@ fn run(number: usize, mut publisher: Publisher<Box<dyn Sink>>, shared: &Shared, 
 }
 
 impl Sink for Box<dyn Sink> {
+    fn most_rows(&self) -> usize {
+        (**self).most_rows()
+    }
+
+    fn announce(&mut self, bench: &str) {
+        (**self).announce(bench);
+    }
+
     fn encode(&mut self, record: &Record<'_>, out: &mut Vec<u8>) {
         (**self).encode(record, out);
     }
@@ -142,8 +158,8 @@ impl Sink for Box<dyn Sink> {
         (**self).send(rows, now)
     }
 
-    fn idle(&mut self, now: Mono) -> Result<(), Trouble> {
-        (**self).idle(now)
+    fn idle(&mut self) -> Result<(), Trouble> {
+        (**self).idle()
     }
 
     fn close(&mut self) {

@@ -1,7 +1,8 @@
 //! What a publisher needs from a server: to encode rows, to send them, and to know the answer.
 
 use super::row::Row;
-use crate::bus::{Mono, Wall};
+use crate::bus::Wall;
+use std::io;
 use std::time::Duration;
 
 /// What the rows of a recording have in common.
@@ -42,6 +43,14 @@ pub struct Record<'a> {
 
 /// A server.
 pub trait Sink: Send {
+    /// The most rows in one request.
+    fn most_rows(&self) -> usize {
+        usize::MAX
+    }
+
+    /// The bench of the next rows.
+    fn announce(&mut self, _bench: &str) {}
+
     /// Appends the form in which a row is sent.
     fn encode(&mut self, record: &Record<'_>, out: &mut Vec<u8>);
 
@@ -55,7 +64,7 @@ pub trait Sink: Send {
     ///
     /// # Errors
     /// The connection was lost.
-    fn idle(&mut self, _now: Mono) -> Result<(), Trouble> {
+    fn idle(&mut self) -> Result<(), Trouble> {
         Ok(())
     }
 
@@ -114,8 +123,6 @@ pub enum Trouble {
     RejectsEverything(String),
     /// The MQTT broker rejects the connection: its return code.
     Refused(u8),
-    /// No secure connection is possible: the reason.
-    Tls(String),
 }
 
 impl Trouble {
@@ -132,7 +139,6 @@ impl Trouble {
             Trouble::Status(..) => "server-error",
             Trouble::RejectsEverything(_) => "rejects-everything",
             Trouble::Refused(_) => "refused",
-            Trouble::Tls(_) => "tls",
         }
     }
 
@@ -144,5 +150,17 @@ impl Trouble {
             Trouble::Refused(code) => *code != 3,
             _ => true,
         }
+    }
+}
+
+/// Why a connection failed.
+pub(super) fn io_trouble(error: &io::Error) -> Trouble {
+    match error.kind() {
+        io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => Trouble::Timeout,
+        io::ErrorKind::UnexpectedEof
+        | io::ErrorKind::ConnectionReset
+        | io::ErrorKind::ConnectionAborted
+        | io::ErrorKind::BrokenPipe => Trouble::Closed,
+        _ => Trouble::NoConnection(error.to_string()),
     }
 }

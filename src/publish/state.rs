@@ -54,6 +54,8 @@ pub enum PublishError {
     Rejects(PathBuf, io::Error),
     /// The server acknowledged nothing in the time.
     Server(Trouble),
+    /// The thread of the publisher has panicked.
+    Panicked,
 }
 
 /// The state of a publisher.

@@ -1,9 +1,13 @@
-//! The address of a server: `influx://HOST[:8086]/DATABASE`, `influx://HOST[:8086]/ORGANISATION/BUCKET`.
+//! The address of a server: `influx://HOST[:8086]/DATABASE`, `influx://HOST[:8086]/ORGANISATION/BUCKET`,
+//! `mqtt://HOST[:1883][/PREFIX]`.
 
 use std::fmt;
 
 /// The port of InfluxDB.
 const INFLUX_PORT: u16 = 8086;
+
+/// The port of MQTT.
+const MQTT_PORT: u16 = 1883;
 
 /// The longest short name, in characters.
 const LONGEST_NAME: usize = 100;
@@ -26,6 +30,8 @@ pub struct Target {
 pub enum Scheme {
     /// InfluxDB line protocol over HTTP.
     Influx,
+    /// MQTT.
+    Mqtt,
 }
 
 /// Why an address cannot be used. It is not shown, because it may contain a secret.
@@ -39,6 +45,10 @@ pub enum TargetError {
     Host,
     /// It names no database.
     Database,
+    /// It needs TLS.
+    Tls,
+    /// Its topic contains a wildcard.
+    Topic,
     /// It has parts that are not known: a query or a fragment.
     Query,
 }
@@ -59,13 +69,16 @@ impl Target {
         }
         let (scheme, port) = match scheme {
             "influx" => (Scheme::Influx, INFLUX_PORT),
+            "mqtt" => (Scheme::Mqtt, MQTT_PORT),
+            "influx+https" | "mqtts" => return Err(TargetError::Tls),
             _ => return Err(TargetError::Scheme),
         };
         let (host, port) = host_and_port(authority, port).ok_or(TargetError::Host)?;
         let path: Vec<String> = path.split('/').filter(|part| !part.is_empty()).map(str::to_owned).collect();
         match scheme {
             Scheme::Influx if !matches!(path.len(), 1 | 2) => return Err(TargetError::Database),
-            Scheme::Influx => {}
+            Scheme::Mqtt if path.iter().any(|part| part.contains('+')) => return Err(TargetError::Topic),
+            Scheme::Influx | Scheme::Mqtt => {}
         }
         Ok(Target { scheme, host, port, path })
     }
@@ -82,6 +95,7 @@ impl fmt::Display for Target {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let scheme = match self.scheme {
             Scheme::Influx => "influx",
+            Scheme::Mqtt => "mqtt",
         };
         write!(f, "{scheme}://{}:{}", self.host, self.port)?;
         self.path.iter().try_for_each(|part| write!(f, "/{part}"))
@@ -163,6 +177,7 @@ mod tests {
             target("influx://[::1]:80/org/a%20b/"),
             both("influx://[::1]:80/org/a%20b", "influx----1--80-org-a-20b")
         );
+        assert_eq!(target("mqtt://broker/a/b"), both("mqtt://broker:1883/a/b", "mqtt-broker-1883-a-b"));
         for (text, error) in [
             ("lab1", TargetError::Scheme),
             ("http://lab1/db", TargetError::Scheme),
@@ -176,6 +191,9 @@ mod tests {
             ("influx://la b/db", TargetError::Host),
             ("influx://lab1", TargetError::Database),
             ("influx://lab1/a/b/c", TargetError::Database),
+            ("mqtt://lab1/a+", TargetError::Topic),
+            ("influx+https://lab1/db", TargetError::Tls),
+            ("mqtts://lab1", TargetError::Tls),
         ] {
             assert_eq!(target(text), Err(error), "{text}");
         }

@@ -230,6 +230,7 @@ fn wrong_arguments_change_nothing() {
         ("influx://lab1/db?token=s3cret", "--to must not contain ? or #"),
         ("http://lab1/db", "--to has an unknown kind of server"),
         ("influx://lab1", "--to names no database"),
+        ("influx+https://lab1/db", "--to needs TLS, which this program does not contain"),
         ("influx://lab1:0/db", "--to has no valid host and port"),
     ] {
         let done = publish(&bench, &format!("run.csv --to {url}")).exit(2);
@@ -272,4 +273,76 @@ fn service_follows_a_rotated_recording_and_waits_for_the_server() {
     let done = bench.end(child).exit(0);
     assert!(done.stderr.contains("rows sent"), "{}", done.stderr);
     assert_eq!(server.lines().len(), rows);
+}
+
+/// Reads one MQTT packet: its first byte and its body.
+fn read_packet(stream: &mut TcpStream) -> Option<(u8, Vec<u8>)> {
+    let mut byte = [0];
+    stream.read_exact(&mut byte).ok()?;
+    let (first, mut length, mut shift) = (byte[0], 0, 0);
+    loop {
+        stream.read_exact(&mut byte).ok()?;
+        length |= usize::from(byte[0] & 127) << shift;
+        shift += 7;
+        if byte[0] < 128 {
+            break;
+        }
+    }
+    let mut body = vec![0; length];
+    stream.read_exact(&mut body).ok()?;
+    Some((first, body))
+}
+
+/// A broker on loopback that acknowledges everything. The first connection is closed before the acknowledgement of its
+/// third message. Sends each message as `TOPIC PAYLOAD`, a retained one with `!`.
+fn broker() -> (SocketAddr, mpsc::Receiver<String>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address");
+    let (to, messages) = mpsc::channel();
+    thread::spawn(move || {
+        for (number, mut stream) in listener.incoming().map_while(Result::ok).enumerate() {
+            let mut count = 0;
+            while let Some((first, body)) = read_packet(&mut stream) {
+                let text = |from: usize, to: usize| String::from_utf8_lossy(&body[from..to]).into_owned();
+                match first >> 4 {
+                    1 => stream.write_all(b"\x20\x02\0\0").expect("writable"),
+                    3 => {
+                        count += 1;
+                        if number == 0 && count == 3 {
+                            break;
+                        }
+                        let end = 2 + usize::from(u16::from_be_bytes([body[0], body[1]]));
+                        let mark = if first & 1 == 1 { "!" } else { "" };
+                        let _ = to.send(format!("{mark}{} {}", text(2, end), text(end + 2, body.len())));
+                        stream.write_all(&[0x40, 2, body[end], body[end + 1]]).expect("writable");
+                    }
+                    _ => break,
+                }
+            }
+        }
+    });
+    (address, messages)
+}
+
+#[test]
+fn rows_are_mqtt_messages() {
+    let bench = recorded(4);
+    let (address, messages) = broker();
+    let done = publish(&bench, &format!("run.csv --to mqtt://{address}/lab --tag bench=3")).exit(0);
+    assert!(done.stderr.contains("the server closed the connection without an answer; trying again"), "{done:?}");
+    let all: Vec<String> = messages.try_iter().collect();
+    assert_eq!(
+        (all[0].as_str(), all.last().map(String::as_str)),
+        ("!lab/3/status online", Some("!lab/3/status offline"))
+    );
+    let mut lines = Vec::new();
+    for message in all.iter().filter(|message| !message.contains("/status ")) {
+        // The recording is of the virtual clock, so no value is fresh.
+        let payload = message.strip_prefix("lab/3/127/pressure ").expect(message);
+        let row: serde_json::Value = serde_json::from_str(payload).expect(payload);
+        assert_eq!((&row["file"], &row["tags"]["part"]), (&"run.csv".into(), &"P107".into()));
+        lines.push(row["line"].as_u64().expect("a line"));
+    }
+    // The rows of the lost connection are repeated.
+    assert!(lines.ends_with(&[2, 3, 4, 5]) && lines.len() > 4, "{lines:?}");
 }
