@@ -94,6 +94,17 @@ fn unusable_files_give_line_and_reason() {
         let error = eds::read(&bytes).expect_err(name);
         assert_eq!(error.to_string(), expected, "{name}");
     }
+    for (start, expected) in [
+        ("PK\x03\x04\x14\0", "line 1: this is a zip archive: unpack it, and use the EDS file in it"),
+        ("%PDF-1.4\n", "line 1: this is a PDF document, perhaps the manual; expected an EDS or DCF file"),
+        ("\n<!DOCTYPE html>\n", "line 1: this is a web page: download the EDS file itself"),
+        (
+            "name = \"flow\"\n[identify]\n[[signal]]\n",
+            "line 1: this is a device description in TOML: use --device instead of --eds",
+        ),
+    ] {
+        assert_eq!(eds::read(start.as_bytes()).expect_err(start).to_string(), expected);
+    }
 }
 
 #[test]

@@ -141,6 +141,9 @@ fn sdo(table: &mut Table<'_>) -> SdoStyle {
 
 fn pdo(table: &mut Table<'_>) -> PdoStyle {
     let style = PdoStyle { remap: table.or_default("remap"), timer: table.optional("timer") };
+    if let Some(timer) = style.timer.filter(|timer| !matches!(timer, 254 | 255)) {
+        table.mistake("timer", format!("timer: {timer} is neither 254 nor 255"));
+    }
     table.finish();
     style
 }

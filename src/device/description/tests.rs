@@ -22,7 +22,7 @@ fn source_and_identify_are_optional() {
 #[test]
 fn unknown_keys_are_listed_with_their_line() {
     let known = "signal, name, title, vendor, source, unconfirmed, quirks, error_history, error_counters, repeating_average_ms, \
-                 auto_bit_rate, identify, bit_rates, factory, sdo, pdo, startup, assign, autozero, object, emcy";
+                 auto_bit_rate, identify, bit_rates, factory, sdo, pdo, startup, assign, autozero, object, emcy, deviation";
     let expected = format!("x.toml:4: unknown key \"signals\" (known: {known})");
     assert_eq!(mistakes("signals = 1"), [expected]);
     let below = mistakes(
@@ -69,6 +69,15 @@ fn a_missing_key_has_the_line_of_its_table() {
         matches!(misspelt.as_slice(), [only] if only.starts_with("x.toml:6: unknown key \"chanel\"")),
         "{misspelt:?}"
     );
+}
+
+#[test]
+fn timer_is_a_type_with_an_event_timer() {
+    for wrong in [0, 253] {
+        let mistakes = mistakes(&format!("[pdo]\ntimer = {wrong}\n"));
+        assert!(mistakes[0].ends_with(&format!(": timer: {wrong} is neither 254 nor 255")), "{mistakes:?}");
+    }
+    assert_eq!(mistakes("[pdo]\ntimer = 254\n"), [""; 0]);
 }
 
 #[test]

@@ -143,6 +143,9 @@ pub fn read(bytes: &[u8]) -> Result<Eds, EdsError> {
     let text = text::decode(bytes);
     let mut warnings = Vec::new();
     let ini = ini::Ini::read(&text, &mut warnings);
+    if let Some(reason) = other_format(bytes, &text) {
+        return Err(EdsError { line: 1, reason: reason.to_owned() });
+    }
     if ini.sections.is_empty() {
         return Err(no_section(&text));
     }
@@ -179,6 +182,23 @@ fn section_index(name: &str) -> Option<u16> {
     let digits = name.get(..4)?;
     let is_object = name.len() == 4 || name[4..].starts_with(['s', 'S', 'n', 'N', 'v', 'V', 'd', 'D']);
     u16::from_str_radix(digits, 16).ok().filter(|_| is_object)
+}
+
+/// What to do with a file of another format that is often mistaken for an EDS.
+fn other_format(bytes: &[u8], text: &str) -> Option<&'static str> {
+    let binary: [(&[u8], &str); 4] = [
+        (b"PK\x03\x04", "this is a zip archive: unpack it, and use the EDS file in it"),
+        (b"\x1f\x8b", "this is a gzip file: unpack it (gunzip)"),
+        (b"%PDF", "this is a PDF document, perhaps the manual; expected an EDS or DCF file"),
+        (b"MZ", "this is a program, perhaps an installer; expected an EDS or DCF file"),
+    ];
+    let known = binary.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, reason)| *reason);
+    let start = text.trim_start().get(..14).unwrap_or_default().to_ascii_lowercase();
+    let is_page = start.starts_with("<!doctype html") || start.starts_with("<html");
+    known.or(is_page.then_some("this is a web page: download the EDS file itself")).or_else(|| {
+        let is_description = text.lines().any(|line| matches!(line.trim(), "[[signal]]" | "[[object]]"));
+        is_description.then_some("this is a device description in TOML: use --device instead of --eds")
+    })
 }
 
 fn no_section(text: &str) -> EdsError {
