@@ -221,13 +221,17 @@ impl WatchArgs {
                 nodes => open::nodes(master, global, nodes)?,
             };
             let overrides = descriptions::overrides_on(master, global, &nodes)?;
+            let is_live = master.bus().is_live();
             let mut claims = Some(std::mem::take(claims));
             let mut report = |event: &WatchEvent<'_>| {
                 // The mappings are read. From now on, the command only listens.
                 claims.take();
                 match *event {
                     WatchEvent::Restarted(node) => {
-                        console.warn(&format!("node {node} restarted; its mapping is assumed to be unchanged"));
+                        // A recording shows only what other masters read again.
+                        let mapping =
+                            if is_live { "assumed to be unchanged" } else { "unknown until it is read again" };
+                        console.warn(&format!("node {node} restarted; its mapping is {mapping}"));
                     }
                     WatchEvent::Failed(failure) => {
                         console.warn(&format!("{}: the node is not shown", ErrorMessage::of(failure).message));

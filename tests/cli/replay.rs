@@ -457,6 +457,24 @@ fn requested_signals_and_nodes_that_are_missing_are_named() {
     let done = replay(&bench, "t.log", "log 5,6").exit(7);
     assert!(done.stderr.ends_with("cangauge: node 6 lost: no measurements at the end\n"), "{}", done.stderr);
     replay(&bench, "t.log", "log all").exit(0);
+    // MH-4: TPDO2 with the temperature is not in the recording.
+    let done = replay(&bench, "t.log", "log 5 temperature --device mh4 --accept-mismatch").exit(3);
+    assert_eq!(done.stderr, "cangauge: the recording contains no TPDO with these signals of these nodes\n");
+}
+
+#[test]
+fn start_of_a_recorded_node_is_no_restart() {
+    let bench = Bench::of("mh4@1");
+    let boot_up = |ms: u32| format!("(1700000000.{ms:03}000) can0 705#00\n");
+    let log = recording(|number, ms, id, data| {
+        let again = if number == 14 { boot_up(ms - 1) } else { String::new() };
+        format!("{again}(1700000000.{ms:03}000) can0 {id}#{data}\n")
+    });
+    fs::write(bench.path("t.log"), format!("{}{log}", boot_up(0))).expect("written");
+    let done = replay(&bench, "t.log", "log 5");
+    assert_eq!(done.stderr.matches("node 5 restarted").count(), 1, "{}", done.stderr);
+    let done = replay(&bench, "t.log", "pdo watch 5").exit(0);
+    assert!(done.stderr.contains("node 5 restarted; its mapping is unknown until it is read again"), "{}", done.stderr);
 }
 
 #[test]

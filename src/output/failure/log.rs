@@ -50,8 +50,9 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> CauseText {
         }
         LogFailure::UnknownMapping => unknown_mapping(failure),
         LogFailure::OtherLength { mapped, received, is_live } => other_length(failure, *mapped, *received, *is_live),
-        LogFailure::NothingReceived { within, nodes, has_traffic, interface } => {
-            nothing_received(*within, nodes, *has_traffic, interface.as_deref())
+        LogFailure::NothingReceived { has_request, within, nodes, has_traffic, interface } => {
+            let what = if *has_request { "no TPDO with these signals" } else { "no TPDO" };
+            nothing_received(what, *within, nodes, *has_traffic, interface.as_deref())
         }
         LogFailure::NoMeasurements { within, nodes } => no_measurements(*within, nodes),
         LogFailure::NodesLost { nodes, .. } => CauseText::new(nodes_lost(nodes)),
@@ -126,13 +127,14 @@ fn no_measurements(within: Duration, nodes: &[(NodeId, Silence)]) -> CauseText {
 
 /// A passive recording received no TPDO.
 fn nothing_received(
+    what: &str,
     within: Duration,
     nodes: &[(NodeId, Option<NmtState>)],
     has_traffic: bool,
     interface: Option<&str>,
 ) -> CauseText {
     let Some(interface) = interface else {
-        return CauseText::new("the recording contains no TPDO of these nodes");
+        return CauseText::new(format!("the recording contains {what} of these nodes"));
     };
     let within = format_duration(within);
     if !has_traffic {
@@ -146,7 +148,7 @@ fn nothing_received(
         [(only, _)] => only.to_string(),
         _ => "all".to_owned(),
     };
-    let words = CauseText::new(format!("no measurements within {within}: no TPDO received{states}"));
+    let words = CauseText::new(format!("no measurements within {within}: {what} received{states}"));
     // The nodes are already started, so they wait for another trigger.
     if nodes.iter().all(|(_, state)| *state == Some(NmtState::Operational)) {
         return words.hint("--passive cannot read the reason from the nodes: omit it");

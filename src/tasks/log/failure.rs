@@ -57,8 +57,10 @@ pub enum LogFailure {
         /// `false` for a recording that is replayed.
         is_live: bool,
     },
-    /// A passive recording received no TPDO of these nodes.
+    /// A passive recording received no TPDO of these nodes, or none with the requested signals.
     NothingReceived {
+        /// Whether only some signals were requested.
+        has_request: bool,
         /// The waiting time.
         within: Duration,
         /// The nodes, each with the state in its last heartbeat.

@@ -65,7 +65,8 @@ pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Fa
         let state = |node: &NodeId| recording.observed.get(node).and_then(|observed| observed.state);
         let nodes = options.nodes.iter().map(|node| (*node, state(node))).collect();
         let (has_traffic, interface) = (recording.has_traffic, recording.interface.clone());
-        return Failure::general(LogFailure::NothingReceived { within, nodes, has_traffic, interface });
+        let has_request = !options.wanted.is_empty();
+        return Failure::general(LogFailure::NothingReceived { has_request, within, nodes, has_traffic, interface });
     }
     let nodes: Vec<(NodeId, Silence)> =
         recording.silent().into_iter().map(|silent| (silent.node(), recording.silence(silent))).collect();

@@ -168,6 +168,9 @@ impl Recording<'_> {
             listener.forget(node, &mut self.decoder);
             self.update_sources();
         }
+        // In a passive recording, a boot-up message that is the first sign of a node is no restart.
+        let is_unseen = !self.observed.contains_key(&node) && !self.has_sent(node) && self.early.is_empty();
+        let is_start = self.listener.is_some() && is_unseen;
         let observed = self.observed.entry(node).or_default();
         (observed.booted, observed.heartbeat_stopped) = (is_boot_up, false);
         observed.commanded = observed.commanded.filter(|_| !is_boot_up);
@@ -189,7 +192,7 @@ impl Recording<'_> {
             HeartbeatChange::State(NmtState::Operational) => {}
             HeartbeatChange::State(state) => observer.event(&LogEvent::State(node, state), at),
         }
-        if is_boot_up {
+        if is_boot_up && !is_start {
             self.restarted(node, at, master, observer);
         }
     }
