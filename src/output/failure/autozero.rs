@@ -2,6 +2,7 @@
 
 use super::CauseText;
 use crate::canopen::id::NodeId;
+use crate::device::unit::Unit;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::autozero::{
@@ -45,32 +46,43 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> CauseText {
             CauseText::new(format!("it has no autozero of channel {channel} (no {object})"))
         }
         AutozeroFailure::LimitUnit { signal, unit, limit } => {
-            let present = unit.map_or_else(|| "has no known unit".to_owned(), |unit| format!("is in {unit}"));
-            CauseText::new(format!("the limit in {limit} cannot be converted: {signal} {present}"))
+            CauseText::new(format!("the limit in {limit} cannot be converted: {signal} {}", present_unit(*unit)))
         }
         AutozeroFailure::RestartedBefore => {
             CauseText::new("the device restarted during the measurement: nothing was changed")
         }
         AutozeroFailure::Unsafe { target, failed_check, channel } => {
-            let words = CauseText::new(format!("{}: nothing was changed", reason(failed_check)));
             let choice = channel.map(|channel| format!(" --channel {channel}")).unwrap_or_default();
-            words.hint(remedy(*target, failed_check, &node, &choice))
+            CauseText::new(format!("{}: nothing was changed", reason(failed_check))).hint(remedy(
+                *target,
+                failed_check,
+                &node,
+                &choice,
+            ))
         }
         AutozeroFailure::RestartedAfter => CauseText::new(
             "the device accepted the signature, then restarted: the zero is lost unless the device stored it",
         ),
         AutozeroFailure::NotZero { signal, reading, has_acted, offset } => {
-            let reads = match reading {
-                Some(mean) if *has_acted => format!("{signal} reads {} afterwards, not zero", quantity(*mean)),
-                Some(mean) => format!("nothing has changed: {signal} reads {}", quantity(*mean)),
-                None => format!("{signal} has no valid value afterwards"),
-            };
-            CauseText::new(format!("the device accepted the signature, and {reads}; {}", offset_change(offset)))
+            not_zero(signal, *reading, *has_acted, offset)
         }
         AutozeroFailure::OtherOffsetStored => {
             CauseText::new("the offset changed between the zero and the store: another offset was stored")
         }
     }
+}
+
+fn not_zero(signal: &str, reading: Option<Quantity>, has_acted: bool, offset: &OffsetChange) -> CauseText {
+    let reads = match reading {
+        Some(mean) if has_acted => format!("{signal} reads {} afterwards, not zero", quantity(mean)),
+        Some(mean) => format!("nothing has changed: {signal} reads {}", quantity(mean)),
+        None => format!("{signal} has no valid value afterwards"),
+    };
+    CauseText::new(format!("the device accepted the signature, and {reads}; {}", offset_change(offset)))
+}
+
+fn present_unit(unit: Option<Unit>) -> String {
+    unit.map_or_else(|| "has no known unit".to_owned(), |unit| format!("is in {unit}"))
 }
 
 fn offset_change(offset: &OffsetChange) -> String {

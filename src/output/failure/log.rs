@@ -2,7 +2,7 @@
 
 use super::CauseText;
 use crate::bus::time::format_duration;
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtState;
 use crate::canopen::pdo::TpdoNumber;
 use crate::output::diagnosis;
@@ -30,11 +30,7 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> CauseText {
                 .hint("read it by SDO: --poll 100ms (without --sync); or put it into a TPDO: cangauge pdo map --help")
         }
         LogFailure::NotOverheard { name, known } => not_overheard(name, known),
-        LogFailure::DifferentSyncIds(ids) => {
-            let ids: Vec<String> = ids.iter().map(|(node, id)| format!("node {node}: {id}")).collect();
-            CauseText::new(format!("the nodes have different COB-IDs of SYNC (1005h): {}", ids.join(", ")))
-                .hint("set 1005h to the same value in all nodes, or record them one by one")
-        }
+        LogFailure::DifferentSyncIds(ids) => different_sync_ids(ids),
         LogFailure::DifferentSyncCounters(values) => {
             let values: Vec<String> = values.iter().map(|(node, value)| format!("node {node}: {value}")).collect();
             CauseText::new(format!("the nodes expect different SYNC counters (1019h): {}", values.join(", ")))
@@ -74,6 +70,12 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> CauseText {
         }
         LogFailure::EventsLost { output } => CauseText::new(format!("events lost: {output} could not keep up")),
     }
+}
+
+fn different_sync_ids(ids: &[(NodeId, CanId)]) -> CauseText {
+    let ids: Vec<String> = ids.iter().map(|(node, id)| format!("node {node}: {id}")).collect();
+    CauseText::new(format!("the nodes have different COB-IDs of SYNC (1005h): {}", ids.join(", ")))
+        .hint("set 1005h to the same value in all nodes, or record them one by one")
 }
 
 fn unknown_mapping(failure: &Failure) -> CauseText {
