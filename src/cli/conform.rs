@@ -1,17 +1,20 @@
 //! `cangauge conform`.
 
+use super::exit::FileError;
+use super::file::ReportFile;
 use super::journal::SettingsJournal;
 use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::output::conform::{CaseRow, ResultRow, left, summary};
+use crate::output::conform::{CaseRow, ConformRecord, ResultRow, SavedReport, left, summary};
 use crate::output::failure::ErrorMessage;
 use crate::tasks::conform::{Area, CaseResult, ConformFailure, ConformOptions, cases, conform};
 use crate::tasks::{Failure, Kind, config};
-use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Subcommand};
+use std::path::{Path, PathBuf};
 
-/// Check a device against CiA 301
+/// Check a device against CiA 301 and CiA 305
 ///
 /// The command runs a list of cases. Each case sends requests, right ones and wrong ones, and compares the answers with
 /// the standard. It prints a verdict for each case: pass, deviates, not-judged or not-applicable. A deviation that the
@@ -19,24 +22,39 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 ///
 /// The device should be alone on the bus. If other nodes or other traffic are seen, only one area can be checked
 /// (--only). The command writes only objects of 1000h to 1FFFh and settings of the device profile. Afterwards all
-/// settings and the NMT state are as before. A reset is part of some cases. Settings of 2000h to 5FFFh that are not
+/// settings and the NMT state are as before. With --store, settings are also stored and restored for a while, and LSS
+/// sets the present node-ID; afterwards the present settings are stored. A reset is part of some cases. Settings of 2000h to 5FFFh that are not
 /// stored are lost by it, and are named.
 ///
 /// The exit code is 0 if there is no deviation, or only known ones, and 1 if there is a deviation.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
 )]
 pub(crate) struct Conform {
+    #[command(subcommand)]
+    other: Option<Other>,
     /// Node-ID: 5, 0x7f
-    #[arg(value_parser = parse_node)]
-    node: NodeId,
+    #[arg(value_parser = parse_node, required = true)]
+    node: Option<NodeId>,
     /// Run only the cases of this area
     #[arg(long, value_name = "AREA", value_parser = PossibleValuesParser::new(Area::ALL.map(Area::name)).try_map(|text| text.parse::<Area>()))]
     only: Option<Area>,
     /// Do not run this case: SDO-07. Can be repeated
     #[arg(long, value_name = "CASE", value_parser = parse_case)]
     skip: Vec<String>,
+    /// Also run the cases that write to non-volatile memory or set the node-ID
+    #[arg(long)]
+    store: bool,
+    /// Write the verdicts as JUnit XML, for CI servers. An existing file is replaced
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Write a report with the frames of each deviation: FILE.html to print, or FILE.json for conform diff. Can be
+    /// repeated. An existing file is replaced
+    #[arg(long, value_name = "FILE", value_parser = parse_report)]
+    report: Vec<PathBuf>,
     /// List the cases; use no bus
     #[arg(long)]
     pub(super) dry_run: bool,
@@ -46,6 +64,52 @@ fn parse_node(text: &str) -> Result<NodeId, String> {
     match text.parse::<super::args::Nodes>()? {
         super::args::Nodes::These(nodes) if nodes.len() == 1 => Ok(nodes[0]),
         _ => Err("conform checks one node".to_owned()),
+    }
+}
+
+/// The other use of the command.
+#[derive(Debug, Subcommand)]
+enum Other {
+    Diff(Diff),
+}
+
+/// Compare two reports of conform, for example of an old and a new firmware
+///
+/// The command lists the cases whose verdict or findings differ. The exit code is 0 if there are none, and 1 otherwise.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  cangauge conform diff old.json new.json")]
+struct Diff {
+    /// The first report, from --report FILE.json
+    #[arg(value_name = "A")]
+    first: PathBuf,
+    /// The second report
+    #[arg(value_name = "B")]
+    second: PathBuf,
+}
+
+impl Diff {
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let read = |path: &Path| -> anyhow::Result<SavedReport> {
+            let what = || format!("read {}", path.display());
+            let text = std::fs::read_to_string(path).map_err(|source| FileError { what: what(), source })?;
+            let wrong = |error| ErrorMessage::usage(format!("{}: not a report of conform: {error}", path.display()));
+            Ok(SavedReport::parse(&text).map_err(wrong)?)
+        };
+        let rows = read(&self.first)?.diff(read(&self.second)?);
+        global.print(&rows)?;
+        match rows.len() {
+            0 => Ok(()),
+            1 => Err(ErrorMessage::new(Kind::CheckFailed, "1 case differs").into()),
+            several => Err(ErrorMessage::new(Kind::CheckFailed, format!("{several} cases differ")).into()),
+        }
+    }
+}
+
+fn parse_report(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("html" | "json") => Ok(path),
+        _ => Err("the name of a report ends in .html or .json".to_owned()),
     }
 }
 
@@ -60,32 +124,59 @@ fn parse_case(text: &str) -> Result<String, String> {
 impl Conform {
     /// The nodes that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
-        if self.dry_run { Claim::Nothing } else { Claim::Bus }
+        if self.only_reads() { Claim::Nothing } else { Claim::Bus }
+    }
+
+    /// Whether the command uses no bus.
+    pub(super) fn only_reads(&self) -> bool {
+        self.dry_run || self.other.is_some()
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let options = ConformOptions { only: self.only, skip: self.skip.clone() };
+        match (&self.other, self.node) {
+            (Some(Other::Diff(diff)), _) => diff.run(global),
+            (None, Some(node)) => self.check(global, node),
+            (None, None) => Err(ErrorMessage::usage("which node? cangauge conform NODE").into()),
+        }
+    }
+
+    fn check(&self, global: &Global, node: NodeId) -> anyhow::Result<()> {
+        let options = ConformOptions { only: self.only, skip: self.skip.clone(), store: self.store };
         if self.dry_run {
             return global.print(&options.selected().map(CaseRow).collect::<Vec<_>>());
         }
-        let overrides = descriptions::overrides(global, &[self.node])?;
+        let open = |path: &PathBuf| ReportFile::create(path, false, None).map(|file| (path.clone(), file));
+        let junit = self.junit.as_ref().map(open).transpose()?;
+        let files = self.report.iter().map(open).collect::<anyhow::Result<Vec<_>>>()?;
+        let overrides = descriptions::overrides(global, &[node])?;
         let console = global.console();
         let mut stream = global.stream::<ResultRow>()?;
-        let (report, printed) = global.with_master(|master| {
+        let (report, bus, printed) = global.with_master(|master| {
             let mut journal = Journal { bus: master.bus().name().to_owned(), console: &console, file: None };
             let mut printed = Ok(());
             let mut observe = |result: &CaseResult| {
                 if printed.is_ok() {
-                    printed = stream.push(&ResultRow { node: self.node, result: result.clone() });
+                    printed = stream.push(&ResultRow { node, result: result.clone() });
                 }
             };
-            let report = conform(master, self.node, &overrides, &options, &mut journal, &mut observe)?;
-            Ok((report, printed))
+            let report = conform(master, node, &overrides, &options, &mut journal, &mut observe)?;
+            let bus = (master.bus().name().to_owned(), master.bus().bit_rate(), master.bus().now().wall);
+            Ok((report, bus, printed))
         })?;
         printed.map_err(super::exit::stdout)?;
-        console.note(&format!("node {}: {}", self.node, summary(&report)));
+        let command = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ");
+        let (bus, bit_rate, time) = bus;
+        let record = ConformRecord { time, bus: &bus, bit_rate, command: &command, report: &report };
+        for (path, file) in files {
+            let is_html = path.extension().is_some_and(|extension| extension == "html");
+            file.write(if is_html { record.html() } else { record.json() }.as_bytes())?;
+        }
+        if let Some((_, file)) = junit {
+            file.write(record.junit().as_bytes())?;
+        }
+        console.note(&format!("node {node}: {}", summary(&report)));
         if let Some(left) = left(&report) {
-            console.warn(&format!("node {}: {left}", self.node));
+            console.warn(&format!("node {node}: {left}"));
         }
         let deviations = report.results.iter().filter(|result| result.is_new_deviation()).count();
         match deviations {

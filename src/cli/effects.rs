@@ -40,7 +40,7 @@ impl Command {
             Command::Pdo(pdo) => pdo.writes(),
             Command::Nmt(nmt) => nmt.writes(),
             Command::Config(config) => !config.only_reads(),
-            Command::Conform(conform) => !conform.dry_run,
+            Command::Conform(conform) => !conform.only_reads(),
             Command::Lss(_) | Command::Autozero(_) | Command::Tare(_) | Command::Store(_) | Command::Restore(_) => true,
             _ => false,
         };

@@ -23,6 +23,19 @@ impl Master<'_> {
         })
     }
 
+    /// Receives frames for this time, and ignores late answers to [`Master::exchange`]. The SDO client would take them
+    /// for those of a second device.
+    ///
+    /// # Errors
+    /// The bus failed, or the user interrupted.
+    pub fn discard_answers(&mut self, time: Duration) -> Result<(), Error> {
+        let until = self.now() + time;
+        self.outside_sdo(|master| {
+            while master.next_raw(until)?.is_some() {}
+            Ok(())
+        })
+    }
+
     fn first(&mut self, answer: CanId, timeout: Duration) -> Result<Option<Received>, Error> {
         let until = self.now() + timeout;
         loop {

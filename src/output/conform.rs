@@ -1,8 +1,13 @@
 //! Results of `conform`: one row for each case.
 
+mod diff;
+mod record;
 mod words;
 
-pub use words::{finding, page, why_not};
+pub use diff::{DiffRow, SavedReport};
+pub use record::ConformRecord;
+pub use words::finding;
+use words::page;
 
 use super::report::{Cell, Column, Report};
 use super::text;
@@ -46,18 +51,6 @@ pub struct ResultRow {
     pub result: CaseResult,
 }
 
-impl ResultRow {
-    /// The findings, or why there is no verdict.
-    fn details(&self) -> Vec<String> {
-        match &self.result.verdict {
-            Verdict::Pass => Vec::new(),
-            Verdict::Deviates(findings) => findings.iter().map(finding).collect(),
-            Verdict::NotJudged(why) => vec![why_not(why)],
-            Verdict::NotApplicable(why) => vec![why_not(why)],
-        }
-    }
-}
-
 /// The frames as in `candump`: `>` for sent ones.
 fn frames(transcript: &Transcript) -> Vec<String> {
     let frame = |one: &Exchanged| format!("{} {}", if one.is_sent { '>' } else { '<' }, one.frame);
@@ -93,7 +86,7 @@ impl Report for ResultRow {
             case.severity.name().into(),
             case.sentence.into(),
             case.clause.into(),
-            Cell::list(self.details()),
+            Cell::list(record::details(result)),
             if deviates { case.meaning.into() } else { Cell::Null },
             Cell::list(result.not_restored.iter().map(ToString::to_string)),
             Cell::Real(result.length.as_secs_f64(), 3),
@@ -108,7 +101,7 @@ impl Report for ResultRow {
     fn line(&self, out: &mut dyn Write) -> io::Result<()> {
         let (result, case) = (&self.result, self.result.case);
         writeln!(out, "{:<7} {:<14}  {}", case.id, result.verdict.name(), case.sentence)?;
-        for detail in self.details() {
+        for detail in record::details(result) {
             writeln!(out, "        {}", text::safe(&detail))?;
         }
         if let Verdict::Deviates(_) = result.verdict {

@@ -46,7 +46,7 @@ fn test_case(text: &mut String, verdict: &Verdict, failures: &[Failure], seconds
 }
 
 /// Escapes text for XML elements and attributes. Characters that XML 1.0 does not allow become U+FFFD.
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

@@ -6,9 +6,13 @@ use serde_json::json;
 #[test]
 fn known_deviations_are_named_with_their_page_and_are_no_failure() {
     let done = Bench::of("mh4@1").run("conform 1").exit(0);
-    assert!(done.stdout.contains("known: the manual states it (page 4.1.8, 4.1.9, 4.2.4, 4.2.5)"), "{}", done.stdout);
+    assert!(
+        done.stdout.contains("known: the manual states it (section 4.1.8, 4.1.9, 4.2.4, 4.2.5)"),
+        "{}",
+        done.stdout
+    );
     assert!(done.stdout.starts_with("SDO-01  pass            A read of 1000h"), "{}", done.stdout);
-    assert!(done.stderr.contains("node 1: 64 cases in"), "{}", done.stderr);
+    assert!(done.stderr.contains("node 1: 118 cases in"), "{}", done.stderr);
 }
 
 #[test]
@@ -50,4 +54,29 @@ fn dry_run_lists_the_cases_and_uses_no_bus() {
     bench.run("conform 1 --skip SDO-99").exit(2);
     bench.run("conform 1,2").exit(2);
     bench.run("conform 1 --only everything").exit(2);
+}
+
+#[test]
+fn reports_are_written_and_compared() {
+    let bench = Bench::of("mh4@1");
+    let file = |name: &str| bench.path(name).display().to_string();
+    let (html, junit, old, new) = (file("r.html"), file("r.xml"), file("old.json"), file("new.json"));
+    bench.run(&format!("conform 1 --only od --report {html} --report {old} --junit {junit}")).exit(0);
+    let page = std::fs::read_to_string(&html).expect("the page");
+    assert!(page.contains("<h2>Deviations that the manual states</h2>\n<h3>OD-05:"), "{page}");
+    assert!(page.contains("&gt; 601#4010100000000000"), "{page}");
+    let xml = std::fs::read_to_string(&junit).expect("the file");
+    assert!(xml.contains("tests=\"10\" failures=\"0\" errors=\"0\" skipped=\"0\""), "{xml}");
+    let other = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x1014\" = 0x701 }\n");
+    other.run(&format!("conform 1 --only od --report {new} --junit {junit}")).exit(1);
+    assert!(std::fs::read_to_string(&junit).expect("the file").contains("<failure type=\"deviates\""));
+    let done = bench.run(&format!("conform diff {old} {new}")).exit(1);
+    assert_eq!(
+        done.stdout,
+        "CASE   BEFORE  AFTER     WHAT\nOD-09  pass    deviates  1005h and 1014h contain allowed CAN-IDs\n"
+    );
+    bench.run(&format!("conform diff {old} {old}")).prints("");
+    bench.run(&format!("conform diff {old} {html}")).exit(2);
+    bench.run("conform diff missing.json missing.json").exit(8);
+    bench.run("conform 1 --report r.txt").exit(2);
 }

@@ -1,6 +1,6 @@
-//! Benches on which all is well: `doctor` finds nothing.
+//! Benches on which all is well: `doctor` finds nothing, and `conform` no deviation.
 
-use crate::bench::bench;
+use crate::bench::{bench, identity};
 use crate::env_number;
 use crate::kinds::LARGE_KIND;
 use crate::random::Random;
@@ -10,11 +10,17 @@ use cangauge::bus::coded::Coded;
 use cangauge::master::{Master, Timing};
 use cangauge::node::Overrides;
 use cangauge::sim::Recorder;
+use cangauge::tasks::Failure;
+use cangauge::tasks::config::{Journal, Snapshot};
+use cangauge::tasks::conform::{ConformOptions, conform};
 use cangauge::tasks::doctor::{DoctorOptions, examine};
 use std::time::Duration;
 
 /// The number of benches of a plain `cargo test`; others: `ENGINE_HEALTHY=1000`.
 const BENCHES: u64 = 60;
+
+/// The number of devices that a plain `cargo test` checks with `conform`.
+const CHECKED: u64 = 16;
 
 /// The devices of a scenario without its faults. They enter OPERATIONAL by themselves, and a master sends SYNC.
 fn healthy(seed: u64) -> Spec {
@@ -69,4 +75,60 @@ fn doctor_finds_nothing_where_all_is_well() {
         }
     }
     assert!(wrong.is_empty(), "{} benches\n{}", wrong.len(), wrong[..wrong.len().min(5)].join("\n"));
+}
+
+/// A device without a fault, alone on its bus. Descriptions that lack the vendor-ID are incomplete: another kind is used.
+fn alone(seed: u64) -> Spec {
+    let mut spec = healthy(seed);
+    spec.others.clear();
+    spec.devices.truncate(1);
+    for device in &mut spec.devices {
+        // The object for the start (1F80h, 2330h) has its default.
+        device.start = false;
+        // Some devices reject a shorter time, so that it could not be restored.
+        device.event_timer_ms = device.event_timer_ms.filter(|time| *time >= 100);
+        if identity(device).vendor == 0 {
+            device.kind = "mc1609";
+        }
+    }
+    spec
+}
+
+struct NoJournal;
+
+impl Journal for NoJournal {
+    fn begin(&mut self, _: &Snapshot) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn finish(&mut self) {}
+}
+
+#[test]
+fn conform_finds_no_deviation_on_a_device_without_a_fault() {
+    let mut wrong = Vec::new();
+    for seed in 1..=env_number("ENGINE_HEALTHY").unwrap_or(CHECKED) {
+        let spec = alone(seed);
+        let recorder = Recorder::new(Box::new(std::io::sink())).expect("no file");
+        let mut bus = Coded::new(bench(&spec, &recorder), spec.codec);
+        let until = bus.mono() + Duration::from_millis(20);
+        while matches!(bus.receive(until), Ok(cangauge::bus::Event::Frame(_))) {}
+        let node = crate::carry_out::node(spec.devices[0].node.expect("a node-ID"));
+        let options = ConformOptions { store: seed % 2 == 0, ..ConformOptions::default() };
+        let mut master = Master::new(&mut bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
+        let result = conform(&mut master, node, &Overrides::new(), &options, &mut NoJournal, &mut |_| {});
+        match result {
+            Ok(report) => {
+                let deviations = report.results.iter().filter(|result| result.is_new_deviation());
+                let found: Vec<String> =
+                    deviations.map(|result| format!("{} {:?}", result.case.id, result.verdict)).collect();
+                if !found.is_empty() || !report.not_restored.is_empty() {
+                    let left = &report.not_restored;
+                    wrong.push(format!("seed {seed}: {found:?} not restored {left:?}\n{:?}", spec.devices));
+                }
+            }
+            Err(failure) => wrong.push(format!("seed {seed}: {failure}\n{:?}", spec.devices)),
+        }
+    }
+    assert!(wrong.is_empty(), "{} devices\n{}", wrong.len(), wrong[..wrong.len().min(5)].join("\n"));
 }

@@ -2,6 +2,7 @@
 
 mod deviant;
 mod table;
+mod table_more;
 
 use super::pdo_map::{Fault, FaultyBus};
 use cangauge::bus::memory::{Clock, MemoryBus};
@@ -63,7 +64,8 @@ fn run(bus: &mut dyn Bus, kind: &str, options: &ConformOptions) -> Result<Confor
 }
 
 fn checked(bus: &mut dyn Bus, kind: &str) -> ConformReport {
-    run(bus, kind, &ConformOptions::default()).unwrap_or_else(|failure| panic!("{kind}: {failure}"))
+    let options = ConformOptions { store: true, ..ConformOptions::default() };
+    run(bus, kind, &options).unwrap_or_else(|failure| panic!("{kind}: {failure}"))
 }
 
 /// The cases with a deviation that the manual does not state, with their findings.
@@ -99,7 +101,7 @@ fn contents(bus: &mut MemoryBus) -> Contents {
 fn simulated_devices_have_only_the_deviations_of_their_manuals() {
     let known = [
         ("mh4", &[("OD-05", "4.1.8, 4.1.9, 4.2.4, 4.2.5")][..]),
-        ("d20", &[("SDO-08", "7"), ("SDO-09", "7"), ("OD-05", "16")]),
+        ("d20", &[("SDO-08", "7"), ("SDO-09", "7"), ("OD-05", "16"), ("PDO-20", "6")]),
         ("mc1609", &[]),
         ("dps", &[("SDO-08", "table 23"), ("SDO-09", "table 23")]),
         ("hydac", &[]),
@@ -120,7 +122,17 @@ fn simulated_devices_have_only_the_deviations_of_their_manuals() {
 
 #[test]
 fn each_deviation_is_found_by_its_case_and_by_no_other() {
-    let rows = [table::SDO, table::OD, table::NMT, table::ERROR_CONTROL].concat();
+    let rows = [
+        table::SDO,
+        table::OD,
+        table::NMT,
+        table::ERROR_CONTROL,
+        table_more::PDO,
+        table_more::EMCY,
+        table_more::STORE,
+        table_more::LSS,
+    ]
+    .concat();
     let (mut wrong, mut found) = (Vec::new(), BTreeSet::new());
     for (kind, case, deviation) in rows {
         let mut bus = bus(kind, Some(deviation));
@@ -163,7 +175,7 @@ fn an_interrupted_check_restores_the_device() {
             run(&mut clean, kind, &options).expect("a report");
             let count = clean.sent.len();
             // The first frames search the bus for other nodes.
-            for at in (260..count).step_by(if kind == "mh4" { 5 } else { 37 }) {
+            for at in (260..count).step_by(if kind == "mh4" { 9 } else { 83 }) {
                 let case = format!("{kind} {area} interrupted at {at} of {count}: {}", clean.sent[at]);
                 let mut faulty = FaultyBus::new(bus(kind, None), Fault::Interrupt, at);
                 let result = run(&mut faulty, kind, &options);

@@ -12,9 +12,14 @@ pub fn finding(finding: &Finding) -> String {
     format!("{object}expected {}; seen: {}", expected(&finding.expected), seen(&finding.seen))
 }
 
-/// Where the manual states a deviation.
-pub fn page(page: &str) -> String {
-    format!("known: the manual states it (page {page})")
+/// Where the manual states a deviation: `known: the manual states it (page 7)`.
+pub(super) fn page(page: &str) -> String {
+    let place = match () {
+        () if page.contains(char::is_alphabetic) => "",
+        () if page.contains('.') => "section ",
+        () => "page ",
+    };
+    format!("known: the manual states it ({place}{page})")
 }
 
 fn codes(codes: &[u32]) -> String {
@@ -48,6 +53,12 @@ fn expected(expected: &Expected) -> String {
         Expected::ZeroPadding => "zeros in the unused bytes".to_owned(),
         Expected::Size(size) => format!("{size} bytes"),
         Expected::Crc(crc) => format!("CRC 0x{crc:04X}"),
+        Expected::Refused => "an abort or an error code".to_owned(),
+        Expected::Acknowledged => "an acknowledgement".to_owned(),
+        Expected::Service(service) => format!("an answer with service {service:02X}h"),
+        Expected::Number(number) => format!("{number} (0x{number:X})"),
+        Expected::AtLeast(time) => format!("at least {}", duration(*time)),
+        Expected::NoError => "an emergency with code 0000h".to_owned(),
         Expected::Range(low, high) => format!("{low} to {high}"),
         Expected::Text => "printable text".to_owned(),
         Expected::State(state) => state.to_string(),
@@ -82,7 +93,7 @@ fn seen(seen: &Seen) -> String {
 }
 
 /// Why a case has no verdict.
-pub fn why_not(why: &WhyNot) -> String {
+pub(super) fn why_not(why: &WhyNot) -> String {
     match why {
         WhyNot::NoObject(object) => format!("the device does not have {object}"),
         WhyNot::NoSuitableObject => "no known object of the device is suitable".to_owned(),
@@ -92,6 +103,15 @@ pub fn why_not(why: &WhyNot) -> String {
         WhyNot::NoState => "the node shows no NMT state: it has no heartbeat (0x1017:0)".to_owned(),
         WhyNot::NoGuarding => "the device does not answer node guarding".to_owned(),
         WhyNot::ErrorHistory => "not run, because the error history (0x1003) is not empty".to_owned(),
+        WhyNot::NoTpdo => "the device has no TPDO with a mapping and this transmission type".to_owned(),
+        WhyNot::NoEventTimer => "the device has no event timer".to_owned(),
+        WhyNot::NoTpdoSent => "the TPDO is not sent".to_owned(),
+        WhyNot::NoRemoteAnswer => "the device does not answer remote requests, which CiA 301 allows".to_owned(),
+        WhyNot::FixedMapping => "the mapping of the device is fixed".to_owned(),
+        WhyNot::NoError => "the device has no error, and a SYNC of eight bytes causes none".to_owned(),
+        WhyNot::NoLss => "the device does not answer LSS".to_owned(),
+        WhyNot::NoService(service) => format!("the device does not answer LSS service {service:02X}h"),
+        WhyNot::NeedsStore => "not run without --store".to_owned(),
         WhyNot::NoRemoteFrames => "this bus carries no remote frames".to_owned(),
         WhyNot::NotAlone => "not run, because other nodes are on the bus".to_owned(),
         WhyNot::Failed(failure) => ErrorMessage::of(failure).message,

@@ -17,11 +17,20 @@ pub enum Area {
     Nmt,
     /// Heartbeat and node guarding.
     ErrorControl,
+    /// TPDOs and their mapping.
+    Pdo,
+    /// Emergencies and the error history.
+    Emcy,
+    /// Storing settings and restoring factory defaults.
+    Store,
+    /// LSS services.
+    Lss,
 }
 
 impl Area {
     /// All areas, in the order in which they run.
-    pub const ALL: [Area; 4] = [Area::Sdo, Area::Od, Area::Nmt, Area::ErrorControl];
+    pub const ALL: [Area; 8] =
+        [Area::Sdo, Area::Od, Area::Nmt, Area::ErrorControl, Area::Pdo, Area::Emcy, Area::Store, Area::Lss];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -30,6 +39,10 @@ impl Area {
             Area::Od => "od",
             Area::Nmt => "nmt",
             Area::ErrorControl => "error-control",
+            Area::Pdo => "pdo",
+            Area::Emcy => "emcy",
+            Area::Store => "store",
+            Area::Lss => "lss",
         }
     }
 
@@ -40,13 +53,18 @@ impl Area {
             Area::Od => "object dictionary",
             Area::Nmt => "NMT states and boot-up",
             Area::ErrorControl => "heartbeat and node guarding",
+            Area::Pdo => "TPDOs and mapping",
+            Area::Emcy => "emergencies and error history",
+            Area::Store => "store and restore",
+            Area::Lss => "LSS services",
         }
     }
 
     /// Whether the frames of the area are addressed to the node alone. Other nodes are then not affected.
     pub fn is_local(self) -> bool {
         match self {
-            Area::Sdo | Area::Od | Area::Nmt | Area::ErrorControl => true,
+            Area::Sdo | Area::Od | Area::Nmt | Area::ErrorControl | Area::Emcy | Area::Store => true,
+            Area::Pdo | Area::Lss => false,
         }
     }
 }
@@ -98,6 +116,10 @@ pub enum Needs {
     Nothing,
     /// The node is alone on the bus.
     SoleNode,
+    /// The option `--store`.
+    Store,
+    /// Both.
+    SoleNodeAndStore,
 }
 
 impl Needs {
@@ -106,7 +128,19 @@ impl Needs {
         match self {
             Needs::Nothing => None,
             Needs::SoleNode => Some("no other node"),
+            Needs::Store => Some("--store"),
+            Needs::SoleNodeAndStore => Some("no other node, --store"),
         }
+    }
+
+    /// Whether the node must be alone on the bus.
+    pub fn needs_sole_node(self) -> bool {
+        matches!(self, Needs::SoleNode | Needs::SoleNodeAndStore)
+    }
+
+    /// Whether the case needs `--store`.
+    pub fn needs_store(self) -> bool {
+        matches!(self, Needs::Store | Needs::SoleNodeAndStore)
     }
 }
 
@@ -152,6 +186,15 @@ impl Case {
     /// The case sends frames that concern all nodes.
     pub(super) const fn alone(self) -> Case {
         Case { needs: Needs::SoleNode, ..self }
+    }
+
+    /// The case writes to non-volatile memory, or sets a node-ID or a bit rate.
+    pub(super) const fn stores(self) -> Case {
+        let needs = match self.needs {
+            Needs::Nothing | Needs::Store => Needs::Store,
+            Needs::SoleNode | Needs::SoleNodeAndStore => Needs::SoleNodeAndStore,
+        };
+        Case { needs, ..self }
     }
 }
 

@@ -51,7 +51,7 @@ const PERIOD: Duration = Duration::from_millis(100);
 const INTERVALS: u32 = 10;
 
 /// The allowed difference of a mean period: 5 %, and 3 ms for the clocks of adapters.
-fn is_near(found: Duration, wanted: Duration) -> bool {
+pub(super) fn is_near(found: Duration, wanted: Duration) -> bool {
     found.abs_diff(wanted) <= wanted / 20 + Duration::from_millis(3)
 }
 
@@ -64,7 +64,7 @@ fn set_period(session: &mut Session<'_, '_>, period: Duration) -> Result<bool, E
 }
 
 /// The mean interval of frames; `None` for fewer than three.
-fn mean_interval(frames: &[Received]) -> Option<Duration> {
+pub(super) fn mean_interval(frames: &[Received]) -> Option<Duration> {
     let [first, _, .., last] = frames else { return None };
     let count = u32::try_from(frames.len() - 1).ok()?;
     Some(last.at.mono.since(first.at.mono) / count)

@@ -60,6 +60,14 @@ pub enum Expected {
     Size(usize),
     /// This CRC.
     Crc(u16),
+    /// An abort with any code.
+    Refused,
+    /// An acknowledgement.
+    Acknowledged,
+    /// An LSS answer with this service.
+    Service(u8),
+    /// This number.
+    Number(u64),
     /// A number in this range.
     Range(u64, u64),
     /// Printable text.
@@ -76,8 +84,12 @@ pub enum Expected {
     Frames(usize),
     /// This period.
     Period(Duration),
+    /// At least this interval.
+    AtLeast(Duration),
     /// A frame within this time.
     Within(Duration),
+    /// An emergency with code 0000h.
+    NoError,
     /// The state, with a toggle bit that alternates.
     AlternatingToggle,
     /// The state, with the toggle bit 0.
@@ -132,6 +144,24 @@ pub enum WhyNot {
     NoGuarding,
     /// The error history has entries, which the case would change.
     ErrorHistory,
+    /// The device has no TPDO with a mapping and this transmission type.
+    NoTpdo,
+    /// The device has no event timer.
+    NoEventTimer,
+    /// The TPDO is not sent.
+    NoTpdoSent,
+    /// The device does not answer remote requests, which CiA 301 allows.
+    NoRemoteAnswer,
+    /// The mapping is fixed.
+    FixedMapping,
+    /// The device has no error, and a wrong SYNC causes none.
+    NoError,
+    /// The device does not answer LSS.
+    NoLss,
+    /// The device does not answer this LSS service.
+    NoService(u8),
+    /// The case needs `--store`.
+    NeedsStore,
     /// The bus carries no remote frames.
     NoRemoteFrames,
     /// Other nodes are on the bus.

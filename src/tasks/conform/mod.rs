@@ -6,14 +6,18 @@
 mod alone;
 mod case;
 mod codes;
+mod emcy;
 mod error_control;
 mod failure;
 mod finding;
+mod lss;
 mod nmt;
 mod od;
+mod pdo;
 mod sdo;
 mod session;
 mod settings;
+mod store;
 
 pub use case::{Area, Case, Needs, Severity};
 pub use failure::{ConformEffect, ConformFailure};
@@ -28,6 +32,7 @@ use crate::master::Master;
 pub use crate::master::{Exchanged, Transcript};
 use crate::node::{Error, Node, Overrides, state};
 use crate::tasks::config::{self, Journal};
+use crate::tasks::settings::open;
 use crate::tasks::{Failure, Kind};
 use session::Session;
 use settings::Settings;
@@ -36,7 +41,8 @@ use std::time::Duration;
 /// All cases, in the order in which they run.
 pub fn cases() -> impl Iterator<Item = &'static Case> {
     let sdo = [sdo::CASES, sdo::segments::CASES, sdo::general::CASES, sdo::blocks::CASES];
-    sdo.into_iter().chain([od::CASES, nmt::CASES, error_control::CASES]).flatten()
+    let others = [od::CASES, nmt::CASES, error_control::CASES, pdo::CASES, pdo::mapping::CASES, pdo::locks::CASES];
+    sdo.into_iter().chain(others).chain([emcy::CASES, store::CASES, lss::CASES]).flatten()
 }
 
 /// What to check.
@@ -46,6 +52,8 @@ pub struct ConformOptions {
     pub only: Option<Area>,
     /// The numbers of cases that are not run.
     pub skip: Vec<String>,
+    /// Also run the cases that store settings, set the node-ID, or write a signature.
+    pub store: bool,
 }
 
 impl ConformOptions {
@@ -123,27 +131,33 @@ pub fn conform(
     journal: &mut dyn Journal,
     observe: &mut dyn FnMut(&CaseResult),
 ) -> Result<ConformReport, Failure> {
-    let before = config::read(master, id, overrides, None)?;
+    let (node, before) = read_node(master, id, overrides)?;
     master.listen(&Filters::All)?;
     let is_local = options.selected().all(|case| case.area.is_local());
-    let is_alone = match alone::others(master, &before.node)? {
+    let is_alone = match alone::others(master, &node)? {
         None => true,
         Some(_) if is_local && options.only.is_some() => false,
         Some(failure) => return Err(Failure::at(id, failure)),
     };
-    journal.begin(&before)?;
+    if let Some(before) = &before {
+        journal.begin(before)?;
+    }
     let mut session = Session {
         master,
-        node: before.node,
+        node,
         is_alone,
         settings: Settings::default(),
         initial_state: None,
         used_nmt: false,
         state_open: false,
         guarded: false,
+        wrong_sync: false,
+        lss_open: false,
+        stored: Vec::new(),
+        is_answer_open: false,
         open_transfer: None,
     };
-    session.read_settings()?;
+    session.read_settings(options.store)?;
     let started = session.master.bus().now();
     let run = session.begin().map_err(Failure::from).and_then(|()| session.run(options, observe));
     let restored = session.restore();
@@ -162,6 +176,21 @@ pub fn conform(
         (Err(failure), Ok(objects), _) if objects.is_empty() => Err(failure),
         (Err(failure), Ok(objects), _) => Err(failure.with(id, ConformEffect::NotRestored(objects))),
         (Err(failure), Err(_), _) => Err(failure.with(id, ConformEffect::Unknown)),
+    }
+}
+
+/// Reads the node and its settings. If the settings cannot be read in the form of a file, there is no journal.
+fn read_node(
+    master: &mut Master<'_>,
+    id: NodeId,
+    overrides: &Overrides,
+) -> Result<(Node, Option<config::Snapshot>), Failure> {
+    match config::read(master, id, overrides, None) {
+        Ok(before) => Ok((before.node.clone(), Some(before))),
+        Err(failure) if matches!(failure.kind(), Kind::Refused | Kind::Unexpected) => {
+            Ok((open(master, id, overrides)?, None))
+        }
+        Err(failure) => Err(failure),
     }
 }
 
@@ -185,8 +214,10 @@ impl Session<'_, '_> {
         for case in options.selected() {
             let started = self.master.now();
             self.master.start_transcript();
-            let verdict = if case.needs == Needs::SoleNode && !self.is_alone {
+            let verdict = if case.needs.needs_sole_node() && !self.is_alone {
                 Ok(Verdict::NotApplicable(WhyNot::NotAlone))
+            } else if case.needs.needs_store() && !options.store {
+                Ok(Verdict::NotApplicable(WhyNot::NeedsStore))
             } else {
                 (case.run)(self)
             };

@@ -40,6 +40,14 @@ pub(super) struct Session<'s, 'bus> {
     pub(super) state_open: bool,
     /// Whether guarding requests were sent, so that life guarding may have failed.
     pub(super) guarded: bool,
+    /// Whether a SYNC with a wrong length was sent, so that an error may be pending.
+    pub(super) wrong_sync: bool,
+    /// Whether the node may be in LSS configuration state.
+    pub(super) lss_open: bool,
+    /// The sub-indices of 1010h whose stored settings the present case has changed.
+    pub(super) stored: Vec<ObjectId>,
+    /// Whether the last raw request may still be answered.
+    pub(super) is_answer_open: bool,
     /// The object of a raw transfer that may be unfinished.
     pub(super) open_transfer: Option<ObjectId>,
 }
@@ -65,7 +73,9 @@ impl Session<'_, '_> {
     pub(super) fn raw_within(&mut self, data: [u8; 8], timeout: Duration) -> Result<Option<Frame>, Error> {
         let id = self.node.id;
         let frame = Frame::full(CanId::sdo_request(id), data);
+        self.is_answer_open = true;
         let answer = self.master.exchange(frame, CanId::sdo_response(id), timeout)?;
+        self.is_answer_open = answer.is_none();
         Ok(answer.map(|received| received.frame))
     }
 
@@ -133,9 +143,14 @@ impl Session<'_, '_> {
 
     /// Sends an NMT command to the node, and waits until it is on the bus.
     pub(super) fn command(&mut self, command: NmtCommand) -> Result<(), Error> {
+        self.queue_command(command);
+        self.pause(SETTLE)
+    }
+
+    /// Sends an NMT command to the node, without waiting.
+    pub(super) fn queue_command(&mut self, command: NmtCommand) {
         (self.used_nmt, self.state_open) = (true, true);
         self.master.send(command.frame(Some(self.node.id)));
-        self.pause(SETTLE)
     }
 
     /// Sends a frame and waits until it is on the bus.

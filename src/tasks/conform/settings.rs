@@ -1,6 +1,7 @@
 //! The settings of the node before the first case, and how they are restored.
 
 use super::session::{SETTLE, Session, number};
+use crate::canopen::frame::Frame;
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::CobId;
@@ -47,6 +48,13 @@ impl Settings {
         self.changed = self.before.keys().copied().collect();
     }
 
+    /// The settings of CiA 404 whose index has these last three digits.
+    pub(super) fn of_profile(&self, digits: &[u16]) -> Vec<(ObjectId, Vec<u8>)> {
+        let is_wanted = |object: &ObjectId| object.index >= 0x6000 && digits.contains(&(object.index & 0xfff));
+        let wanted = self.before.iter().filter(|(object, _)| is_wanted(object) && object.sub > 0);
+        wanted.map(|(object, value)| (*object, value.clone())).collect()
+    }
+
     /// The value of a setting before the first case.
     pub(super) fn before(&self, object: ObjectId) -> Option<&[u8]> {
         self.before.get(&object).map(Vec::as_slice)
@@ -80,11 +88,11 @@ fn objects(node: &Node) -> Vec<ObjectId> {
 
 impl Session<'_, '_> {
     /// Reads all settings.
-    pub(super) fn read_settings(&mut self) -> Result<(), Error> {
+    pub(super) fn read_settings(&mut self, stores: bool) -> Result<(), Error> {
         for object in objects(&self.node) {
             if let Some(value) = self.read_or_skip(object)? {
                 self.settings.before.insert(object, value);
-                if !may_write(object) {
+                if !stores && !may_write(object) {
                     self.settings.protected.insert(object);
                 }
             }
@@ -124,6 +132,14 @@ impl Session<'_, '_> {
         Ok(())
     }
 
+    /// Notes that the mapping of a TPDO may change.
+    pub(super) fn touch_mapping(&mut self, count: ObjectId) -> Result<(), Error> {
+        let known = self.settings.before.keys().filter(|object| object.index == count.index);
+        let known: Vec<ObjectId> = known.copied().collect();
+        self.settings.changed.extend(known);
+        self.touch(count)
+    }
+
     /// Writes a setting. It is restored after the case.
     pub(super) fn set(&mut self, object: ObjectId, bytes: &[u8]) -> Result<(), Error> {
         self.touch(object)?;
@@ -156,10 +172,18 @@ impl Session<'_, '_> {
     }
 
     fn restore_once(&mut self) -> Result<Vec<ObjectId>, Error> {
+        if self.is_answer_open {
+            self.master.discard_answers(SETTLE * 5)?;
+            self.is_answer_open = false;
+        }
+        self.leave_lss()?;
         self.wake_up()?;
         self.end_transfer()?;
         if std::mem::take(&mut self.guarded) {
             self.end_guarding_error()?;
+        }
+        if std::mem::take(&mut self.wrong_sync) {
+            self.send(Frame::empty(self.node.sync))?;
         }
         let mut wrong = self.differing()?;
         for _ in 0..ROUNDS {
@@ -170,6 +194,9 @@ impl Session<'_, '_> {
                 wrong.iter().copied().filter(|object| !self.settings.protected.contains(object)).collect();
             self.write_back(&writable)?;
             wrong = self.differing()?;
+        }
+        if wrong.is_empty() {
+            wrong = self.store_again()?;
         }
         self.settings.changed.clear();
         // What could not be restored is compared again after the next case.

@@ -6,6 +6,7 @@ use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::CanId;
 use cangauge::device::catalog::Model;
 use cangauge::sim::Device;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -29,8 +30,30 @@ pub(super) struct Memory {
     pub(super) booted: Option<Duration>,
     /// The last values written to 1017h, the newest first.
     pub(super) periods: [u16; 2],
+    /// The last value written to each object, and the value before it.
+    pub(super) values: BTreeMap<[u8; 3], [u32; 2]>,
+    /// The last LSS request.
+    pub(super) lss: [u8; 8],
+    /// Whether the last LSS switch was to configuration state.
+    pub(super) is_configuring: bool,
     /// Counts for the deviation itself.
     pub(super) count: u32,
+}
+
+impl Memory {
+    /// The last value written to an object, 0 if none.
+    pub(super) fn written(&self, object: [u8; 3]) -> u32 {
+        self.values.get(&object).map_or(0, |values| values[0])
+    }
+
+    pub(super) fn was_written(&self, object: [u8; 3]) -> bool {
+        self.values.contains_key(&object)
+    }
+
+    /// The value written to an object before the present request.
+    pub(super) fn before(&self, object: [u8; 3]) -> u32 {
+        self.values.get(&object).map_or(0, |values| values[1])
+    }
 }
 
 /// A deviation. Each function gets what the device has received or sends.
@@ -44,6 +67,10 @@ pub(super) enum Deviation {
     Takes(fn(&mut Memory, &Frame) -> Frame),
     /// Changes a frame that it sends.
     Sends(fn(&mut Memory, Frame) -> Vec<Frame>),
+    /// Answers an LSS request in addition to the device.
+    Lss(fn(&mut Memory, [u8; 8]) -> Option<[u8; 8]>),
+    /// Behaves as if another frame followed a received one.
+    Adds(fn(&mut Memory, &Frame) -> Option<Frame>),
     /// Both: takes a frame for another one, and changes what it sends.
     Both(fn(&mut Memory, &Frame) -> Frame, fn(&mut Memory, Frame) -> Vec<Frame>),
 }
@@ -67,6 +94,10 @@ impl Deviant {
             && let Some(request) = frame.all_eight()
         {
             memory.last = memory.request.replace(request);
+            if let [0x22..=0x2f, a, b, c, value @ ..] = request {
+                let before = memory.written([a, b, c]);
+                memory.values.insert([a, b, c], [u32::from_le_bytes(value), before]);
+            }
             match request {
                 [command @ (0xa0 | 0xa4 | 0xc2 | 0xc6), ..] => memory.initiate = command,
                 [0x81, a, b, ..] => memory.segment = [a, b],
@@ -74,6 +105,14 @@ impl Deviant {
                     memory.periods = [u16::from_le_bytes([low, high]), memory.periods[0]];
                     memory.count = 0;
                 }
+                _ => {}
+            }
+        }
+        if let (CanId::LSS_MASTER, Some(request)) = (frame.id(), frame.all_eight()) {
+            memory.lss = request;
+            match request {
+                [0x04, mode, ..] => memory.is_configuring = mode == 1,
+                [0x43, ..] => memory.is_configuring = true,
                 _ => {}
             }
         }
@@ -124,6 +163,19 @@ impl Station for Deviant {
         let mut inner = Outbox::default();
         self.device.receive(now, &frame, &mut inner);
         self.send(now, &mut inner, out);
+        if let (Some(Deviation::Lss(answer)), CanId::LSS_MASTER, Some(request)) =
+            (self.deviation, frame.id(), frame.all_eight())
+            && let Some(answer) = answer(&mut self.memory, request)
+        {
+            out.send(Frame::full(CanId::LSS_SLAVE, answer));
+        }
+        if let Some(Deviation::Adds(add)) = self.deviation
+            && let Some(further) = add(&mut self.memory, &frame)
+        {
+            let mut inner = Outbox::default();
+            self.device.receive(now, &further, &mut inner);
+            self.send(now, &mut inner, out);
+        }
     }
 
     fn wake(&mut self, now: Mono, out: &mut Outbox) {

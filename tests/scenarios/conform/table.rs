@@ -17,16 +17,16 @@ fn reply(command: u8, request: [u8; 8], data: [u8; 4]) -> [u8; 8] {
     [command, a, b, c, d, e, f, g]
 }
 
-fn abort(request: [u8; 8], code: u32) -> [u8; 8] {
+pub(super) fn abort(request: [u8; 8], code: u32) -> [u8; 8] {
     reply(0x80, request, code.to_le_bytes())
 }
 
-fn ack(request: [u8; 8]) -> [u8; 8] {
+pub(super) fn ack(request: [u8; 8]) -> [u8; 8] {
     reply(0x60, request, [0; 4])
 }
 
 /// Whether a request starts with these bytes.
-fn is(request: [u8; 8], start: &[u8]) -> bool {
+pub(super) fn is(request: [u8; 8], start: &[u8]) -> bool {
     request.starts_with(start)
 }
 
@@ -41,21 +41,21 @@ fn is_life(frame: &Frame) -> bool {
 }
 
 /// The frame with changed data.
-fn with(frame: Frame, change: impl FnOnce(&mut Vec<u8>)) -> Vec<Frame> {
+pub(super) fn with(frame: Frame, change: impl FnOnce(&mut Vec<u8>)) -> Vec<Frame> {
     let mut data = frame.data().to_vec();
     change(&mut data);
     vec![Frame::new(frame.id(), &data).expect("eight bytes at most")]
 }
 
 /// Changes the answer to a read of this object.
-fn read(memory: &Memory, frame: Frame, object: [u8; 3], change: fn(&mut Vec<u8>)) -> Vec<Frame> {
+pub(super) fn read(memory: &Memory, frame: Frame, object: [u8; 3], change: fn(&mut Vec<u8>)) -> Vec<Frame> {
     let [a, b, c] = object;
     let is_this = memory.request.is_some_and(|request| is(request, &[0x40, a, b, c]));
     if is_answer(&frame) && is_this { with(frame, change) } else { vec![frame] }
 }
 
 /// Whether this frame is an NMT command with this specifier for this node-ID.
-fn is_nmt(frame: &Frame, specifier: u8, node: u8) -> bool {
+pub(super) fn is_nmt(frame: &Frame, specifier: u8, node: u8) -> bool {
     frame.id() == CanId::NMT && frame.data() == [specifier, node]
 }
 
@@ -223,7 +223,25 @@ pub(super) const OD: &[Row] = &[
     ("mh4", "OD-01", Answers(|_, request| is(request, &[0x40, 0x01, 0x10, 0]).then(|| abort(request, 0x0602_0000)))),
     ("mh4", "OD-02", Sends(|memory, frame| read(memory, frame, [0x01, 0x10, 0], |data| data[4] = 0x10))),
     ("mh4", "OD-03", Sends(|memory, frame| read(memory, frame, [0x18, 0x10, 3], |data| data[0] = 0x4b))),
-    ("mc1609", "OD-04", Sends(|memory, frame| read(memory, frame, [0x18, 0x10, 1], |data| data[4..].fill(0)))),
+    (
+        "mc1609",
+        "OD-04",
+        Both(
+            |_, frame| match frame.all_eight() {
+                // The device shows the same vendor-ID by LSS.
+                Some([service @ (0x40 | 0x46), 0, 0, 0, 0, ..]) => {
+                    Frame::full(frame.id(), [service, 0x1d, 0x01, 0, 0, 0, 0, 0])
+                }
+                _ => *frame,
+            },
+            |memory, frame| {
+                if frame.id() == CanId::LSS_SLAVE && frame.data().first() == Some(&0x5a) {
+                    return with(frame, |data| data[1..].fill(0));
+                }
+                read(memory, frame, [0x18, 0x10, 1], |data| data[4..].fill(0))
+            },
+        ),
+    ),
     ("mh4", "OD-05", Answers(|_, request| is(request, &[0x40, 0x18, 0x10, 5]).then(|| reply(0x43, request, [1; 4])))),
     ("mh4", "OD-06", Answers(|_, request| is(request, &[0x23, 0x18, 0x10, 1]).then(|| ack(request)))),
     ("mh4", "OD-07", Sends(|memory, frame| read(memory, frame, [0x0a, 0x10, 0], |data| data[5] = 0x01))),
@@ -276,7 +294,11 @@ pub(super) const NMT: &[Row] = &[
     ),
     ("mh4", "NMT-04", Ignores(|memory, _, frame| is_nmt(frame, 0x01, NODE) && memory.nmt[1] == 0x02)),
     ("mh4", "NMT-05", Ignores(|memory, _, frame| is_nmt(frame, 0x02, NODE) && memory.nmt[1] == 0x01)),
-    ("mh4", "NMT-06", Ignores(|memory, _, frame| is_nmt(frame, 0x80, NODE) && memory.nmt[1] == 0x01)),
+    (
+        "mh4",
+        "NMT-06",
+        Ignores(|memory, _, frame| is_nmt(frame, 0x80, NODE) && memory.nmt[1] == 0x01 && memory.periods[0] == 50),
+    ),
     ("mh4", "NMT-07", Ignores(|memory, _, frame| frame.data().starts_with(READ_TYPE) && memory.nmt[0] == 0x01)),
     (
         "mh4",
