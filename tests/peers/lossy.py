@@ -71,12 +71,13 @@ class Lossy(Relay):
 
 
 def is_data(direction, identifier, data, sent):
-    """Whether the flipped bit is in a data byte that is not protected by a CRC."""
+    """Whether the flipped bit is in a data byte that is not protected by a CRC. The number of bytes in a segment to a
+    device counts as data: the device could compare the total with the announced size, but the client cannot."""
     place = next(at for at, pair in enumerate(zip(data, sent)) if pair[0] != pair[1])
     if identifier & 0x780 not in (0x580, 0x600):
         return True
     if data[0] >> 5 == 0:
-        return place > 0
+        return place > 0 or direction == OUT and (data[0] ^ sent[0]) & 0x0E != 0
     return bool(data[0] & 2) and place > 3 if direction == IN else True
 
 
