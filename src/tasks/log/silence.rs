@@ -49,7 +49,9 @@ pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Fa
     if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.values().min()) {
         return Failure::at(node, LogFailure::UnknownMapping);
     }
-    if let Err(failure) = check_overheard(&recording.overheard_nodes(), options) {
+    if recording.listener.is_some()
+        && let Err(failure) = check_overheard(&recording.overheard_nodes(), options)
+    {
         return failure;
     }
     if recording.nodes.is_empty() {
