@@ -129,6 +129,15 @@ def wait_for_end(program, files):
     sys.exit("FAILED: rows are not published after 180 s")
 
 
+def wait_for_quiet(file):
+    """Waits until the subscriber has received nothing for 5 s: it is slower than the publishers."""
+    size, quiet = -1, 0
+    while quiet < 5:
+        time.sleep(1)
+        now = file.stat().st_size
+        size, quiet = now, quiet + 1 if now == size else 0
+
+
 def check_influx(folder, recordings):
     total = 0
     for number in range(recordings):
@@ -209,6 +218,8 @@ def main():
         finally:
             for process in processes:
                 process.kill()
+                if isinstance(process, subprocess.Popen):
+                    process.wait()
 
 
 def run(options, dice, words, program, folder, processes):
@@ -223,12 +234,13 @@ def run(options, dice, words, program, folder, processes):
     urls = [f"influx://127.0.0.1:{INFLUX}/lab", f"influx://127.0.0.1:{METRICS}/lab", f"mqtt://127.0.0.1:{BROKER}"]
     files = [str(folder / f"bench{number}.csv") for number in range(options.recordings)]
     publishers = {(file, url): publisher(program, file, url) for file in files for url in urls}
-    processes.append(subscriber)
+    processes.extend([subscriber, *publishers.values()])
     logs = []
     for number, file in enumerate(files):
         log = [program, "-q", "-b", "sim:dps@1", "log", "1", "--poll", "10ms", "--duration", f"{options.seconds}s",
                "-o", file, "--rotate", "20s", "--tag", f"bench={number}"]
         logs.append(subprocess.Popen(log, stdout=subprocess.DEVNULL))
+    processes.extend(logs)
     start, kills = time.monotonic(), 0
     plan = sorted((dice.uniform(0.1, 0.9) * options.seconds, name) for name in running for _ in range(2))
     while any(log.poll() is None for log in logs):
@@ -241,6 +253,7 @@ def run(options, dice, words, program, folder, processes):
         publishers[key].send_signal(signal.SIGKILL)
         publishers[key].wait()
         publishers[key] = publisher(program, *key)
+        processes.append(publishers[key])
         kills += 1
         time.sleep(dice.uniform(0, 0.4))
     if any(log.wait() != 0 for log in logs):
@@ -254,7 +267,7 @@ def run(options, dice, words, program, folder, processes):
     codes = [process.wait(20) for process in publishers.values()]
     if any(codes):
         sys.exit(f"FAILED: exit codes of publishers after SIGTERM: {codes}")
-    time.sleep(2)
+    wait_for_quiet(received)
     subscriber.terminate()
     subscriber.wait()
     check_influx(folder, options.recordings)
