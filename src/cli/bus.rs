@@ -33,7 +33,8 @@ enum Action {
     /// Bring an interface up at a bit rate
     ///
     /// If the interface is up at another bit rate, it goes down for a moment. If it is already up at this bit rate,
-    /// nothing is changed. Only the bit rate, the listen-only mode and the link are set, and then read back.
+    /// nothing is changed. The command sets only the bit rate, the listen-only mode and the up state of the interface,
+    /// and reads them back.
     Up(Up),
     /// Bring an interface down
     Down(Down),

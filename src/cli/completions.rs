@@ -80,7 +80,8 @@ impl Completions {
         let text = match (self.action, self.shell) {
             (Some(Action::Install), shell) => install(shell, global)?,
             (Some(Action::Print(_)), Some(shell)) => {
-                return Err(ErrorMessage::usage(format!("{shell} follows only \"install\"")).into());
+                let message = format!("a second shell name ({shell}) is allowed only after \"install\"");
+                return Err(ErrorMessage::usage(message).hint("cangauge completions install bash").into());
             }
             (Some(Action::Print(shell)), None) => script(shell),
             (None, _) => {
@@ -191,12 +192,13 @@ enum Place {
     Interface,
     Device,
     Words(&'static [&'static str]),
-    /// A signal, or an object if the flag is set.
+    /// A signal; objects are also allowed if the flag is set.
     Name(bool),
     Other,
 }
 
-/// The place of a word: the command with the number of words after it, and the option whose value it is.
+/// Returns what a word can be. `command` is its command, `count` the number of arguments before it, `option` the option
+/// before it.
 fn place(command: &[&str], count: usize, option: Option<&str>) -> Place {
     match (option, command) {
         (Some("bus"), _) => Place::Bus,
@@ -312,7 +314,7 @@ fn buses() -> Vec<String> {
     all
 }
 
-/// The option `-t` or `--timeout`, of the command or of the program.
+/// Finds an option by its word (for example `-t` or `--timeout`): an option of the command or a global one.
 fn find_option<'a>(program: &'a Command, command: &'a Command, word: &str) -> Option<&'a Arg> {
     let mut arguments = command.get_arguments().chain(program.get_arguments());
     match word.strip_prefix("--") {

@@ -51,7 +51,7 @@ enum Action {
         after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply --table forty.csv mh4.toml --address --store --record forty.html\n  cangauge config apply 1 --rollback"
     )]
     Apply(apply::Apply),
-    /// Print the JSON Schema of the file, for editors
+    /// Print the JSON Schema of the settings file, for text editors that complete and check it
     Schema,
 }
 

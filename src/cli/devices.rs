@@ -33,7 +33,7 @@ enum Action {
         /// Name of the description: mh4
         name: String,
     },
-    /// Print a first description of a device from the device and its EDS (--eds); comments mark missing parts
+    /// Print a draft description, made from the connected device and its EDS (--eds); comments mark missing parts
     New {
         /// Node-ID: 5, 0x7f
         node: NodeId,

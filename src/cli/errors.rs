@@ -7,7 +7,7 @@ use crate::canopen::id::NodeId;
 use crate::tasks::settings::errors::{ErrorReport, clear, read};
 use clap::Args;
 
-/// Show the errors of a device, register (1001h) and history (1003h), or clear the history
+/// Show the error register (1001h) and the error history (1003h) of a device, or clear the history
 ///
 /// The meaning of an error code is taken from the description of the device. If it is not there, the error class of
 /// CiA 301 is shown.

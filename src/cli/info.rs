@@ -10,8 +10,8 @@ use clap::Args;
 /// Show everything about a device on one page
 ///
 /// The page shows identity, versions, bit rate, NMT state (if the node sends a heartbeat), monitoring and errors. Then
-/// it shows signals with unit, range, status and settings, TPDOs and manufacturer-specific objects. Last, it shows the
-/// settings that 1010h stores. Missing objects are omitted.
+/// it shows signals with unit, range, status and settings, TPDOs and manufacturer-specific objects. The last section
+/// shows which settings the device can store (1010h), and which it cannot. Missing objects are omitted.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim info 1\n  cangauge -b sim info 127 --format json\n  cangauge -b replay:run.log info 1 --passive"

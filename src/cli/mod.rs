@@ -153,12 +153,12 @@ pub struct Global {
     #[arg(long, global = true)]
     pub(crate) accept_mismatch: bool,
 
-    /// Highest bus load of set-up, scan, polling and config apply together with other traffic [default: 50% while other
-    /// nodes send, otherwise no limit]
+    /// Limit the total bus load: SDO requests of set-up, scan, polling and config apply are delayed above it [default:
+    /// 50% while other nodes send, otherwise no limit]
     #[arg(long, global = true, value_name = "SHARE")]
     pub(crate) max_load: Option<Load>,
 
-    /// Output format: text, JSON Lines or CSV; for log, text means csv, and influx is line protocol
+    /// Output format (influx: InfluxDB line protocol, for log only). For log, text means csv
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
     pub(crate) format: Format,
 

@@ -22,7 +22,7 @@ use std::ops::ControlFlow;
     after_help = "Examples:\n  cangauge monitor\n  cangauge monitor 5 --kind sdo,emcy\n  cangauge monitor --device 5=mh4 --duration 10s\n  cangauge -b replay:trace.log monitor --format json"
 )]
 pub(crate) struct Monitor {
-    /// Show only these nodes, and messages that do not belong to one node: 5, 0x7f, 1-16, 1,5, all
+    /// Nodes to show: 5, 0x7f, 1-16, 1,5, all. Messages that do not belong to one node (SYNC, LSS) are always shown
     #[arg(default_value = "all")]
     nodes: Nodes,
     /// Show only these kinds of messages [default: all]

@@ -45,7 +45,7 @@ enum Action {
     Reset(Targets),
     /// Restart the communication
     ResetComm(Targets),
-    /// Show the states in the heartbeats or from node guarding; "-" if unknown
+    /// Show the NMT states that nodes report by heartbeat or node guarding; "-" if unknown
     State(StateArgs),
     /// Follow heartbeats, boot-ups and losses until Ctrl-C
     Watch(WatchArgs),
@@ -60,7 +60,7 @@ struct Targets {
     /// Exit with 3 if the state cannot be confirmed
     #[arg(long, conflicts_with = "no_wait")]
     confirm: bool,
-    /// Send the command without confirmation
+    /// Send the command, and do not wait for the new state
     #[arg(long)]
     no_wait: bool,
 }

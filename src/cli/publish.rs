@@ -44,8 +44,9 @@ const TOKEN: &str = "CANGAUGE_TOKEN";
 
 /// Send recordings of log to a time-series database or an MQTT broker
 ///
-/// The recording is the spool: publish reads its files, sends the rows in batches, and saves its position only after the
-/// server has acknowledged them. It continues there after a restart of the server, of the program or of the computer.
+/// The recording itself is the send buffer: publish reads its files, sends the rows in batches, and saves its position
+/// only after the server has acknowledged them. It continues there after a restart of the server, of the program or of
+/// the computer.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Servers:
@@ -55,7 +56,7 @@ Servers:
 
 Files:
   run.csv.SERVER.pos       the position (see --status)
-  run.csv.SERVER.rejected  rows that the server never accepts, with its reasons
+  run.csv.SERVER.rejected  rows that the server rejected, with the error messages of the server
 
 Examples:
   cangauge publish run.csv --to influx://lab1/benches

@@ -68,7 +68,7 @@ struct ReadArgs {
     /// Overwrite the file
     #[arg(long, requires = "output")]
     force: bool,
-    /// When to use block transfer: auto for long objects if the device supports it
+    /// When to use block transfer; auto: for long objects, if the device supports it
     #[arg(long, value_name = "HOW", default_value = "auto")]
     block: Block,
 }
@@ -93,7 +93,7 @@ struct WriteArgs {
     /// Write the bytes of a file; - for stdin
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
-    /// When to use block transfer: auto for long objects if the device supports it
+    /// When to use block transfer; auto: for long objects, if the device supports it
     #[arg(long, value_name = "HOW", default_value = "auto")]
     block: Block,
 }

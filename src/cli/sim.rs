@@ -15,7 +15,8 @@ use std::path::PathBuf;
 
 /// Simulate devices on a bus until Ctrl-C
 ///
-/// The devices answer, send and fail as described in their manuals. Use them to test other programs.
+/// The devices behave as described in their manuals, including known deviations and error messages. Use them to test
+/// other programs.
 ///
 /// Lines on standard input change values and cause faults: `pressure 1 5.2bar` holds a value, `silent 1` and `talk 1`
 /// stop and resume all traffic of a node, `emcy 1 F001` sends an emergency (0000 ends it), `unplug 1` and `plug 1`

@@ -13,11 +13,12 @@ use std::time::Duration;
 /// have been received.
 const FOREIGN_TOLERANCE: u64 = 1;
 
-/// A TPDO of unknown transmission type depends on SYNC if it arrives in pairs at this many SYNC messages in a row.
+/// A TPDO of unknown transmission type is treated as synchronous if a pair of it follows this many SYNC messages in a
+/// row.
 const PAIRS: u32 = 3;
 
-/// The frames of such a pair arrive within this part of the SYNC interval.
-const PAIR_PART: u32 = 4;
+/// The two frames of a pair arrive within 1/`PAIR_DIVISOR` of the SYNC interval.
+const PAIR_DIVISOR: u32 = 4;
 
 /// A second sender of a TPDO is detected within this number of SYNC messages of another node.
 const SYNCS_TO_DECIDE: u64 = FOREIGN_TOLERANCE + 2;
@@ -53,7 +54,7 @@ struct SyncedTpdo {
     since_sync: Vec<Mono>,
     /// The time between the last two SYNC messages.
     interval: Duration,
-    /// The latest SYNC messages in a row with a pair of TPDOs.
+    /// The number of consecutive SYNC messages, up to the latest, that were each followed by a pair of TPDOs.
     pairs: u32,
     is_repeated: bool,
     is_shared: bool,
@@ -69,7 +70,7 @@ impl SyncedTpdo {
 
     /// Whether two TPDOs arrived since the last SYNC, one shortly after the other.
     fn has_pair(&self) -> bool {
-        matches!(self.since_sync[..], [first, second] if second.since(first) < self.interval / PAIR_PART)
+        matches!(self.since_sync[..], [first, second] if second.since(first) < self.interval / PAIR_DIVISOR)
     }
 
     /// Whether a TPDO that arrives now is in excess.
@@ -99,7 +100,7 @@ pub(super) struct SyncedTpdos {
     is_producer: bool,
     /// Whether another node sends SYNC, so that a SYNC may have been missed.
     has_other_producer: bool,
-    /// Whether this program sends remote requests, which it does not receive.
+    /// Whether this program sends remote requests. It does not receive its own requests, so it cannot count them.
     is_requesting: bool,
 }
 
@@ -115,7 +116,8 @@ impl SyncedTpdos {
         let (mut own, others): (BTreeMap<_, _>, _) =
             before.into_iter().partition(|(_, tpdo): &(CanId, SyncedTpdo)| tpdo.node == node.id);
         self.tpdos = others;
-        // A node also answers remote requests.
+        // If this program sends remote requests, the answers look like surplus TPDOs. So TPDOs that allow RTR are not
+        // watched.
         let is_requesting = self.is_requesting;
         let is_watched = |tpdo: &&Tpdo| tpdo.cob_id.is_valid() && !(is_requesting && tpdo.cob_id.allows_rtr());
         for tpdo in node.tpdos.iter().filter(is_watched) {
@@ -180,7 +182,7 @@ impl SyncedTpdos {
             return None;
         };
         if frame.is_remote() {
-            // The answer to a request before the first SYNC may arrive after it.
+            // The answer to a remote request that was sent before the first SYNC may arrive after this SYNC.
             tpdo.requests = if tpdo.syncs > 0 { tpdo.requests + 1 } else { 1 };
             return None;
         }

@@ -68,8 +68,8 @@ pub(super) struct Apply {
     #[arg(long, value_name = "FILE.csv", conflicts_with = "rollback")]
     table: Option<PathBuf>,
     /// Set devices that are plugged in one after the other, each with the values of its row. Includes --address and
-    /// --store. The result is written to the column "result" of the table. To check the serial number on the label,
-    /// type this number before you plug in the device
+    /// --store. The result is written to the column "result" of the table. If you type the serial number on the label
+    /// before you plug in the device, it is compared with that of the device
     #[arg(long, requires = "table", conflicts_with = "dry_run")]
     prompt: bool,
     /// Write a report: time, devices, old and new values, verification. It is HTML if the name ends with .html, else

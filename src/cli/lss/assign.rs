@@ -43,7 +43,7 @@ pub(super) struct SetBitrate {
     options: Options,
 }
 
-/// Set the node-ID and bit rate of a device, and store and reset only once
+/// Set the node-ID and bit rate of a device, with a single store and a single reset
 #[derive(Debug, Args)]
 pub(super) struct Set {
     /// Device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured

@@ -35,7 +35,7 @@ impl Arrivals {
     }
 }
 
-/// The inputs of one formula. The formula is evaluated when each input has a new value.
+/// The inputs of one formula. The formula is evaluated when all inputs have a new value.
 #[derive(Clone, Debug)]
 struct InputGroup {
     inputs: Vec<usize>,

@@ -2,7 +2,7 @@
 //!
 //! - Each sample must satisfy the expression. A sample without a valid value fails every expression except `invalid()`.
 //!   A value outside the measuring range is invalid, even if the device still sends a number.
-//! - A comparison of several signals is evaluated when each signal has a new value. If a signal has a second value
+//! - A comparison of several signals is evaluated when all of them have a new value. If a signal has a second value
 //!   before that, its first value is compared with the latest other values. So no sample is skipped.
 
 use super::bind::{AvailableSignals, BoundExpression, LimitWithoutUnit, unit_of};

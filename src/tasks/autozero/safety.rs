@@ -110,7 +110,7 @@ pub enum FailedCheck {
 }
 
 impl FailedCheck {
-    /// Whether the failed_check also applies to a tare. For a tare, the process value may be far from zero.
+    /// Whether this check also applies to a tare. For a tare, the process value may be far from zero.
     pub(super) fn concerns_tare(&self) -> bool {
         matches!(self, FailedCheck::Invalid { .. } | FailedCheck::Unsteady { .. })
     }
