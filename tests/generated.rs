@@ -67,13 +67,15 @@ fn hand_written() -> BTreeMap<String, String> {
 
 /// The section with all cases of `conform`, from the table that runs them.
 fn conform_cases() -> String {
-    let mut section = String::from(".SH CASES\n");
+    let mut section = String::from(
+        ".SH CASES\nEach case states the consequence of a deviation and its severity (high, medium, low).\n",
+    );
     for area in Area::ALL {
         section += &format!(".SS \"{} ({})\"\n", escape(area.title()), escape(area.name()));
         for case in cases().filter(|case| case.area == area) {
             let needs = case.needs.name().map(|needs| format!(" Needs: {needs}.")).unwrap_or_default();
             let text = format!(
-                "{}. {}.{needs}\n.br\nIf not ({}): {}",
+                "{}. {}.{needs}\n.br\nIf it deviates (severity {}): {}",
                 case.sentence,
                 case.clause,
                 case.severity.name(),

@@ -23,8 +23,10 @@ use std::path::{Path, PathBuf};
 /// The device should be alone on the bus. If other nodes or other traffic are seen, only one area can be checked
 /// (--only). The command writes only objects of 1000h to 1FFFh and settings of the device profile. Afterwards all
 /// settings and the NMT state are as before. With --store, settings are also stored and restored for a while, and LSS
-/// sets the present node-ID; afterwards the present settings are stored. A reset is part of some cases. Settings of 2000h to 5FFFh that are not
-/// stored are lost by it, and are named.
+/// sets the present node-ID; afterwards the present settings are stored.
+///
+/// Some cases reset the device. Settings in 2000h to 5FFFh that were not stored are then lost. They are listed as "not
+/// restored".
 ///
 /// The exit code is 0 if there is no deviation, or only known ones, and 1 if there is a deviation.
 #[derive(Debug, Args)]

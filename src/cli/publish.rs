@@ -56,7 +56,7 @@ Servers:
 
 Files:
   run.csv.SERVER.pos       the position (see --status)
-  run.csv.SERVER.rejected  rows that the server rejected, with the error messages of the server
+  run.csv.SERVER.rejected  rows that the server rejected, and its error messages
 
 Examples:
   cangauge publish run.csv --to influx://lab1/benches

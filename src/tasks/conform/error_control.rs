@@ -24,7 +24,7 @@ pub(super) const CASES: &[Case] = &[
     case("ERR-01", "The heartbeat has the period of 1017h", HEARTBEAT, period)
         .matters(High, "Heartbeat consumers report errors."),
     case("ERR-02", "The first heartbeat comes within one period after 1017h is written", HEARTBEAT, first)
-        .matters(Low, "Consumers that start at the write report an error."),
+        .matters(Low, "Heartbeat consumers that start to monitor when 1017h is written report an error."),
     case("ERR-03", "A new period in 1017h is used while the heartbeat runs", HEARTBEAT, change)
         .matters(Medium, "The device must be restarted after a change."),
     case("ERR-04", "0 in 1017h switches the heartbeat off", HEARTBEAT, off)
@@ -263,7 +263,7 @@ fn exclusion(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     if let Some(verdict) = prepare_guarding(session)? {
         return Ok(verdict);
     }
-    // Long, so that a heartbeat is not taken for an answer.
+    // Long, so that a heartbeat is not mistaken for an answer.
     if !set_period(session, PERIOD * 50)? {
         return Ok(NO_HEARTBEAT);
     }

@@ -21,7 +21,7 @@ const CONFIGURE: &str = "CiA 305, configuration services";
 
 pub(super) const CASES: &[Case] = &[
     case("LSS-01", "Switch state global is not answered", SWITCH, global)
-        .matters(Medium, "Masters take the answer for that of another service."),
+        .matters(Medium, "Masters assign the answer to the wrong service."),
     case("LSS-02", "The inquired address is that of 1018h", INQUIRE, address)
         .matters(High, "The device cannot be addressed by the numbers that tools show."),
     case("LSS-03", "The inquired node-ID is the node-ID", INQUIRE, node_id)
@@ -44,7 +44,7 @@ pub(super) const CASES: &[Case] = &[
     )
     .matters(High, "Masters give the device a new node-ID while it is in use."),
     case("LSS-10", "Unknown services are not answered", "CiA 305, protocols", unknown)
-        .matters(Low, "Masters take the answer for that of another service."),
+        .matters(Low, "Masters assign the answer to the wrong service."),
     case("LSS-11", "Answers have eight bytes, and unused bytes are 0", "CiA 305, protocols", form)
         .matters(Low, "Masters that check the whole frame ignore the answers."),
     case("LSS-20", "Node-IDs 0 and 128 are rejected", CONFIGURE, bad_node_id)

@@ -36,7 +36,7 @@ pub(super) const CASES: &[Case] = &[
     case("OD-07", "1008h, 1009h and 100Ah are printable texts", "CiA 301, object 1008h", texts)
         .matters(Low, "Tools show unreadable characters."),
     case("OD-08", "1000h, 1008h and 1018h have the same values in each read", "CiA 301, constant objects", constants)
-        .matters(High, "The device is taken for another one."),
+        .matters(High, "Masters confuse the device with another one."),
     case("OD-09", "1005h and 1014h contain allowed CAN-IDs", "CiA 301, restricted CAN-IDs", cob_ids)
         .matters(High, "SYNC or emergencies disturb other services."),
     case("OD-10", "1005h and 1014h reject restricted CAN-IDs", "CiA 301, restricted CAN-IDs", restricted)

@@ -16,11 +16,11 @@ const fn case(id: &'static str, sentence: &'static str, clause: &'static str, ru
 
 pub(in super::super) const CASES: &[Case] = &[
     case("SDO-20", "Aborts and acknowledgements contain the object of the request", ABORT, multiplexers)
-        .matters(High, "A master takes an answer for that of another request."),
+        .matters(High, "A master assigns the answer to the wrong request."),
     case("SDO-21", "Unused bytes of answers are 0", "CiA 301, SDO protocols", padding)
-        .matters(Low, "Masters that read the object wider than it is get a wrong value."),
+        .matters(Low, "Masters that decode the value with a longer type get a wrong value."),
     case("SDO-22", "Each of 50 reads without a pause is answered once", "CiA 301, SDO protocols", in_a_row)
-        .matters(High, "Reads are lost, or an answer is taken for that of the next read."),
+        .matters(High, "Reads are lost, or an answer is assigned to the next read."),
     case("SDO-23", "A request of fewer than eight bytes is not executed", "CiA 301, SDO protocols", short_request)
         .matters(Low, "A cut-off request changes a setting."),
     case("SDO-24", "Requests to another node-ID are not answered", "CiA 301, predefined connection set", other_node)
