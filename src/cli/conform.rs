@@ -25,8 +25,8 @@ use std::path::{Path, PathBuf};
 /// settings and the NMT state are as before. With --store, settings are also stored and restored for a while, and LSS
 /// sets the present node-ID; afterwards the present settings are stored.
 ///
-/// Some cases reset the device. Settings in 2000h to 5FFFh that were not stored are then lost. They are listed as "not
-/// restored".
+/// Some cases reset the device. Without --store, settings in 2000h to 5FFFh that were not stored are then lost. They are
+/// listed as "not restored" if the object dictionary of the device is known.
 ///
 /// The exit code is 0 if there is no deviation, or only known ones, and 1 if there is a deviation.
 #[derive(Debug, Args)]
