@@ -24,8 +24,9 @@ fn examples() -> BTreeSet<String> {
     }
     let lines = texts.iter().flat_map(|text| text.lines()).map(str::trim);
     let lines = lines.map(|line| line.trim_start_matches("- ").to_owned());
-    let is_example =
-        |line: &String| line.starts_with("cangauge ") && !line.contains("CHANNEL") && !line.contains(" || ");
+    // The second line of a usage: "cangauge conform <COMMAND>".
+    let has_placeholder = |line: &str| line.contains("CHANNEL") || line.contains('<');
+    let is_example = |line: &String| line.starts_with("cangauge ") && !has_placeholder(line) && !line.contains(" || ");
     let examples = lines.filter(is_example);
     examples.map(|line| line.split("  ").next().unwrap_or_default().trim_end_matches(" &").to_owned()).collect()
 }
