@@ -183,7 +183,9 @@ impl<B: Bus> Bus for Paced<B> {
             let (Some(load), Event::Frame(received)) = (&mut self.load, &event) else { return Ok(event) };
             let (frame, now) = (&received.frame, received.at.mono);
             load.on_frame(frame, now, self.limit.0);
-            if !self.answers.contains(&frame.id()) {
+            // Boot-up messages come once, when the devices are switched on.
+            let is_boot_up = frame.id().heartbeat_node().is_some() && frame.data() == [0];
+            if !self.answers.contains(&frame.id()) && !is_boot_up {
                 load.on_traffic(frame, now);
             }
             if now.since(self.requests.1) > IDLE {
@@ -225,11 +227,14 @@ mod tests {
 
     const BIT_RATE: u32 = 250_000;
 
-    /// Sends one frame of 8 bytes at an interval in microseconds, and answers SDO requests.
+    /// Sends one frame at an interval, and answers SDO requests.
     struct Sender {
+        frame: &'static str,
         every: Option<Duration>,
         next: Mono,
     }
+
+    const TPDO: &str = "481#0011223344556677";
 
     impl Station for Sender {
         fn power_on(&mut self, now: Mono, _: &mut Outbox) {
@@ -243,7 +248,7 @@ mod tests {
         }
 
         fn wake(&mut self, _: Mono, out: &mut Outbox) {
-            out.send("481#0011223344556677".parse().expect("a frame"));
+            out.send(self.frame.parse().expect("a frame"));
             self.next = self.next + self.every.unwrap_or_default();
         }
 
@@ -256,12 +261,13 @@ mod tests {
 
     /// Reads as fast as possible for two seconds beside a sender. Returns the number of answers and the load of the
     /// second second.
-    fn read(every: Option<Duration>, limit: Option<u8>, bit_rate: Option<u32>) -> (u32, f64) {
-        let mut memory = MemoryBus::new(Clock::Virtual);
-        memory.attach(Sender { every, next: Mono::START });
-        if let Some(bit_rate) = bit_rate {
-            memory = memory.with_bit_rate(bit_rate);
-        }
+    fn read(every: Option<Duration>, limit: Option<u8>) -> (u32, f64) {
+        read_beside(Sender { frame: TPDO, every, next: Mono::START }, limit)
+    }
+
+    fn read_beside(sender: Sender, limit: Option<u8>) -> (u32, f64) {
+        let mut memory = MemoryBus::new(Clock::Virtual).with_bit_rate(BIT_RATE);
+        memory.attach(sender);
         let request: Frame = "601#4000100000000000".parse().expect("a frame");
         let mut bus = Paced::new(memory, limit, Vec::new());
         bus.listen(&Filters::All).expect("filters");
@@ -290,34 +296,39 @@ mod tests {
     #[test]
     fn load_stays_below_the_limit_beside_other_traffic() {
         // One frame of about 0.5 ms each 2.5 ms.
-        let (answers, load) = read(us(2_500), None, Some(BIT_RATE));
+        let (answers, load) = read(us(2_500), None);
         assert!((0.46..=0.505).contains(&load), "{load}, {answers} answers");
-        let (_, load) = read(us(2_500), Some(30), Some(BIT_RATE));
+        let (_, load) = read(us(2_500), Some(30));
         assert!((0.26..=0.305).contains(&load), "{load}");
     }
 
     #[test]
     fn silent_bus_has_no_limit_unless_the_user_sets_one() {
-        let (free, load) = read(None, None, Some(BIT_RATE));
+        let (free, load) = read(None, None);
         assert!(load > 0.8, "{load}, {free} answers");
         // A heartbeat per second does not count as traffic.
-        let (beside, _) = read(us(1_000_000), None, Some(BIT_RATE));
+        let (beside, _) = read(us(1_000_000), None);
         assert!(beside.abs_diff(free) <= 2, "{beside} and {free}");
-        let (_, load) = read(None, Some(20), Some(BIT_RATE));
+        // Boot-up messages are no traffic either. Frequent heartbeats are.
+        let (_, load) = read_beside(Sender { frame: "701#00", every: us(10_000), next: Mono::START }, None);
+        assert!(load > 0.8, "{load}");
+        let (_, load) = read_beside(Sender { frame: "701#7F", every: us(10_000), next: Mono::START }, None);
+        assert!((0.46..=0.505).contains(&load), "{load}");
+        let (_, load) = read(None, Some(20));
         assert!((0.17..=0.205).contains(&load), "{load}");
     }
 
     #[test]
     fn requests_go_on_slowly_if_others_alone_exceed_the_limit() {
         // One frame of about 0.5 ms each 0.7 ms.
-        let (answers, load) = read(us(700), None, Some(BIT_RATE));
+        let (answers, load) = read(us(700), None);
         assert!((60..=140).contains(&answers), "{answers} answers: about 5 % of the time, load {load}");
     }
 
     #[test]
     fn unwanted_frames_stay_away_and_do_not_extend_the_wait() {
         let mut memory = MemoryBus::new(Clock::Virtual).with_bit_rate(BIT_RATE);
-        memory.attach(Sender { every: us(700), next: Mono::START });
+        memory.attach(Sender { frame: TPDO, every: us(700), next: Mono::START });
         let mut bus = Paced::new(memory, None, Vec::new());
         let answer = CanId::sdo_response("1".parse().expect("a node"));
         bus.listen(&Filters::Only(vec![answer])).expect("filters");
