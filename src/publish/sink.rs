@@ -37,7 +37,7 @@ pub struct Record<'a> {
     pub row: &'a Row<'a>,
     /// The number of its line, counted from 1.
     pub line: u64,
-    /// What it has in common with other rows.
+    /// The tags that it shares with other rows.
     pub origin: &'a Origin,
 }
 

@@ -1,4 +1,4 @@
-//! What a publisher is told and what it reports: options, events, failures and progress.
+//! The options of a publisher, and its reports: events, failures and progress.
 
 use super::position::PositionError;
 use super::row::Tags;

@@ -233,7 +233,7 @@ fn wrong_length(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 fn value_lost(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let object = HEARTBEAT_TIME;
     let Some(value) = session.read(object)? else { return Ok(Verdict::NotApplicable(WhyNot::NoObject(object))) };
-    // A value that nobody has stored.
+    // This value is not stored.
     let new = 54_321u16.to_le_bytes();
     if value == new || session.try_write(object, &new)?.is_some() {
         return Ok(Verdict::NotApplicable(WhyNot::NotWritable(object)));

@@ -26,7 +26,7 @@ pub(super) const CASES: &[Case] = &[
     case("OD-02", "Bit 0 of 1001h is set if any other bit is set", "CiA 301, object 1001h", error_register)
         .matters(Medium, "Masters that check only bit 0 do not notice the error."),
     case("OD-03", "1018h:0 is 1 to 4, and the sub-indices up to it can be read", "CiA 301, object 1018h", identity)
-        .matters(Medium, "Masters cannot tell this device from another one; LSS needs all four numbers."),
+        .matters(Medium, "Masters cannot distinguish this device from others; LSS needs all four numbers."),
     case("OD-04", "The vendor-ID (1018h:1) is not 0", "CiA 301, object 1018h", vendor)
         .matters(Medium, "The maker of the device is unknown to tools."),
     case("OD-05", "Sub-index 0 is the highest sub-index of its object", "CiA 301, sub-index 0", highest_sub_index)
