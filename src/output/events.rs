@@ -7,6 +7,7 @@ use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
 use std::io;
 use std::time::Duration;
+pub(super) use text::left_operational;
 pub use text::{event_text, heartbeat_text, remark_text, two_senders};
 
 /// The columns.

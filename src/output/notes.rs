@@ -4,6 +4,7 @@
 
 use super::console::Console;
 use super::doubt;
+use super::events::left_operational;
 use super::failure::host::up_by_hand;
 use super::failure::{self, autozero, config, conform, pdo, settings, store};
 use super::report::Cell;
@@ -81,6 +82,7 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> NoteText {
         Effect::Pdo(effect) => pdo::effect(&number, effect),
         Effect::Settings(effect) => settings::effect(&number, effect),
         Effect::State(state) => state_text(&number, *state),
+        Effect::LeftOperational(nodes) => NoteText::new("left-operational", left_operational(nodes)),
         Effect::Store(effect) => store::effect(&number, effect),
         Effect::Conform(effect) => conform::effect(&number, effect),
     }

@@ -282,12 +282,7 @@ pub fn log(
     if result.is_ok() {
         recording.ask_silent_nodes(master);
     }
-    let restored = recording.states.restore(master);
-    recording.remarks.extend(recording.states.remarks());
-    if let Err(error) = restored {
-        recording.remarks.push(Remark::StatesNotRestored(Box::new(error)));
-    }
-    Ok(RecordingReport { failed, ..finish(recording, result)? })
+    Ok(RecordingReport { failed, ..restore_states(recording, master, result)? })
 }
 
 /// Reads the setup of the nodes. Returns the nodes, and the failures of the others.
@@ -359,6 +354,27 @@ fn record_passively(
     master.listen(&Filters::All)?;
     let result = recording.run(master, observer);
     finish(recording, result)
+}
+
+/// Restores the nodes' states and creates the report.
+fn restore_states(
+    mut recording: Recording<'_>,
+    master: &mut Master<'_>,
+    result: Result<(), Error>,
+) -> Result<RecordingReport, Failure> {
+    let restored = recording.states.restore(master);
+    let states = recording.states.effects(restored.is_ok());
+    recording.remarks.extend(recording.states.remarks());
+    if let Err(error) = restored {
+        recording.remarks.push(Remark::StatesNotRestored(Box::new(error)));
+    }
+    // A failure is shown without the remarks. It names the states itself.
+    let with_states = |mut failure: Failure| {
+        failure.effects.extend(states.iter().cloned());
+        failure
+    };
+    let report = finish(recording, result).map_err(with_states)?;
+    Ok(RecordingReport { nothing: report.nothing.map(with_states), ..report })
 }
 
 /// Creates the report. If at least one value was recorded, Ctrl-C is not a failure.

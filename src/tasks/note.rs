@@ -48,6 +48,8 @@ pub enum Effect {
     Settings(SettingsEffect),
     /// The NMT state is not the previous state.
     State(StateEffect),
+    /// These nodes were started and stay operational: their previous state is unknown.
+    LeftOperational(Vec<NodeId>),
     /// A store or restore failed.
     Store(StoreEffect),
     /// A check against the standard ended early.

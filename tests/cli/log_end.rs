@@ -8,13 +8,15 @@ use std::process::{Command, Stdio};
 #[test]
 fn mh4_is_silent_without_sync() {
     let bench = Bench::of("mh4@1");
-    let silent = "cangauge: node 1: no measurements within 5 s: TPDO1 waits for SYNC, and no node sends SYNC\n\
+    let silent = "cangauge: node 1: no measurements within 5 s: TPDO1 waits for SYNC, and no node sends SYNC; node 1 was \
+                  started and stays operational: its previous state is unknown and cannot be restored\n\
                   hint: add --sync 100ms, or read by SDO: --poll 100ms (node 1)\n";
     let done = bench.run("log 1 -o run.csv").exit(3);
     assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", silent));
     assert_eq!(bench.files(), [""; 0], "no file is left");
     bench.run("log 1").fails(3, silent);
-    bench.run("log 1 --format json").exit(3).error();
+    let error = bench.run("log 1 --format json").exit(3).error();
+    assert_eq!(error["error"]["effects"][0]["code"], "left-operational");
     let within = bench.run("log 1 --duration 2s").exit(3).stderr;
     assert!(within.contains("no measurements within 2 s"), "{within}");
     let within = bench.run("log 1 --duration 1h").exit(3).stderr;
@@ -245,7 +247,8 @@ fn ctrl_c_before_the_first_row_is_interrupted() {
     let mut rest = String::new();
     std::io::Read::read_to_string(&mut reader, &mut rest).expect("the rest");
     assert_eq!(child.wait().expect("its end").code(), Some(130), "{rest}");
-    assert_eq!(rest, "cangauge: interrupted\n");
+    let left = "node 1 was started and stays operational: its previous state is unknown and cannot be restored";
+    assert_eq!(rest, format!("cangauge: interrupted; {left}\n"));
     assert_eq!(bench.files(), [""; 0], "no file is left");
 }
 

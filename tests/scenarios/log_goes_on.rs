@@ -15,7 +15,9 @@ use cangauge::device::catalog;
 use cangauge::device::unit::Unit;
 use cangauge::master::{Master, Request, Timing};
 use cangauge::sim::Bench;
+use cangauge::tasks::Effect;
 use cangauge::tasks::log::{Change, LogEvent, LogOptions, Mode, RecordingReport, Remark, TpdoChange, log};
+use cangauge::tasks::note::StateEffect;
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 use std::time::Duration;
@@ -193,21 +195,26 @@ fn restarted_node_is_started_again() {
     assert!(after > 20, "rows continue: {after}");
 }
 
+/// A recording while these sent frames are lost: the NMT commands, their places among the sent frames, and the report.
+fn record_while_lost(device: &str, lost: &[u64]) -> (Vec<String>, Vec<u64>, RecordingReport) {
+    let devices = format!("clock = \"virtual\"\n{device}set = {{ \"0x1017\" = 100 }}\n");
+    let mut bus = Bench::from_toml(&devices, Path::new("")).expect("a bench").open().expect("a bus");
+    bus.attach(NmtRecorder::default());
+    let plan = FaultPlan { lose_sent: lost.iter().copied().collect(), ..FaultPlan::default() };
+    let (mut bus, mut kept) = (Faulty::new(bus, plan), RecordedRows::default());
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &self::plan(Mode::AsSent), &mut kept);
+    let recorder = bus.inner().stations::<NmtRecorder>().next().expect("attached");
+    (recorder.commands.clone(), recorder.places.clone(), outcome.expect("a report"))
+}
+
 /// The command that returns the node to its previous state is lost. After the first loss it is sent again; the second
 /// loss is reported.
 #[test]
 fn lost_return_to_the_previous_state_is_noticed() {
     let run = |lost: &[u64]| {
-        let devices = format!("clock = \"virtual\"\n{DPS}set = {{ \"0x1017\" = 100 }}\n");
-        let mut bus = Bench::from_toml(&devices, Path::new("")).expect("a bench").open().expect("a bus");
-        bus.attach(NmtRecorder::default());
-        let plan = FaultPlan { lose_sent: lost.iter().copied().collect(), ..FaultPlan::default() };
-        let (mut bus, mut kept) = (Faulty::new(bus, plan), RecordedRows::default());
-        let outcome = log(&mut Master::new(&mut bus, Timing::default()), &self::plan(Mode::AsSent), &mut kept);
-        let remarks = outcome.expect("a recording").remarks;
-        let is_reported = remarks.iter().any(|remark| matches!(remark, Remark::StatesNotRestored(_)));
-        let recorder = bus.inner().stations::<NmtRecorder>().next().expect("attached");
-        (recorder.commands.clone(), recorder.places.clone(), is_reported)
+        let (commands, places, report) = record_while_lost(DPS, lost);
+        let is_reported = report.remarks.iter().any(|remark| matches!(remark, Remark::StatesNotRestored(_)));
+        (commands, places, is_reported)
     };
     let (commands, places, is_reported) = run(&[]);
     assert_eq!((commands, is_reported), (["000#0105", "000#8005"].map(str::to_owned).to_vec(), false));
@@ -215,6 +222,19 @@ fn lost_return_to_the_previous_state_is_noticed() {
     assert_eq!((commands, is_reported), (["000#0105", "000#8005"].map(str::to_owned).to_vec(), false));
     let (commands, _, is_reported) = run(&[places[1], places[1] + 1]);
     assert_eq!((commands, is_reported), (["000#0105"].map(str::to_owned).to_vec(), true));
+}
+
+/// An MH-4 sends no value without SYNC, so the recording has no summary, and its failure names the state.
+#[test]
+fn failure_without_rows_names_a_state_that_was_not_restored() {
+    let effects = |lost: &[u64]| {
+        let (_, places, report) = record_while_lost(MH4, lost);
+        (places, report.nothing.expect("a failure").effects)
+    };
+    let (places, before) = effects(&[]);
+    assert_eq!(before, []);
+    let (_, after) = effects(&[places[1], places[1] + 1]);
+    assert_eq!(after, [Effect::State(StateEffect::NotRestored)]);
 }
 
 /// After a restart, the answers with the vendor are lost until 4 s: the program does not report another

@@ -207,7 +207,8 @@ pub fn remark_text(remark: &Remark) -> String {
     }
 }
 
-fn left_operational(nodes: &[NodeId]) -> String {
+/// The text for nodes that were started and stay operational.
+pub(in crate::output) fn left_operational(nodes: &[NodeId]) -> String {
     match nodes {
         [node] => format!(
             "node {node} was started and stays operational: its previous state is unknown and cannot be restored"

@@ -7,8 +7,9 @@ use crate::device::profiles;
 use crate::master::{Error, Happening, Master};
 use crate::node::Node;
 use crate::node::wait::{Policy, wait};
-use crate::tasks::Failure;
 use crate::tasks::nmt::NmtFailure;
+use crate::tasks::note::StateEffect;
+use crate::tasks::{Effect, Failure};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -133,12 +134,22 @@ impl NmtStates {
     /// The started nodes that stay operational because their previous state is unknown, and the nodes that were not
     /// started.
     pub(super) fn remarks(&self) -> impl Iterator<Item = Remark> + use<> {
-        let unknown: Vec<NodeId> =
-            self.started.iter().filter(|(_, before)| before.is_none()).map(|(&node, _)| node).collect();
-        let not_started = self.not_started.clone();
-        [Remark::LeftOperational(unknown), Remark::NotStarted(not_started)].into_iter().filter(
+        let remarks = [Remark::LeftOperational(self.left_operational()), Remark::NotStarted(self.not_started.clone())];
+        remarks.into_iter().filter(
             |remark| !matches!(remark, Remark::LeftOperational(nodes) | Remark::NotStarted(nodes) if nodes.is_empty()),
         )
+    }
+
+    /// The nodes that may not be in their previous state.
+    pub(super) fn effects(&self, is_restored: bool) -> Vec<Effect> {
+        let left = Some(self.left_operational()).filter(|nodes| !nodes.is_empty());
+        let failed = (!is_restored).then_some(Effect::State(StateEffect::NotRestored));
+        left.map(Effect::LeftOperational).into_iter().chain(failed).collect()
+    }
+
+    /// The started nodes that stay operational because their previous state is unknown.
+    fn left_operational(&self) -> Vec<NodeId> {
+        self.started.iter().filter(|(_, before)| before.is_none()).map(|(&node, _)| node).collect()
     }
 }
 
