@@ -74,13 +74,12 @@ fn conform_cases() -> String {
         section += &format!(".SS \"{} ({})\"\n", escape(area.title()), escape(area.name()));
         for case in cases().filter(|case| case.area == area) {
             let needs = case.needs.name().map(|needs| format!(" Needs: {needs}.")).unwrap_or_default();
-            let text = format!(
-                "{}. {}.{needs}\n.br\nIf it deviates (severity {}): {}",
-                case.sentence,
-                case.clause,
-                case.severity.name(),
-                case.meaning
-            );
+            let severity = case.severity.name();
+            let deviation = match case.meaning {
+                "" => String::new(),
+                meaning => format!("\n.br\nIf it deviates (severity {severity}): {meaning}"),
+            };
+            let text = format!("{}. {}.{needs}{deviation}", case.sentence, case.clause);
             section += &format!(".TP\n\\fB{}\\fR\n{}\n", escape(case.id), escape(&text));
         }
     }

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 ///
 /// The command runs a list of cases. Each case sends requests, right ones and wrong ones, and compares the answers with
 /// the standard. It prints a verdict for each case: pass, deviates, not-judged or not-applicable. A deviation that the
-/// manual of the device states is reported as known.
+/// manual of the device states is reported as known. The cases of the area "timing" print measured times and no verdict.
 ///
 /// The device should be alone on the bus. If other nodes or other traffic are seen, only one area can be checked
 /// (--only). The command writes only objects of 1000h to 1FFFh and settings of the device profile. Afterwards all
@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
+    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n  timing         timing profile: figures without a verdict\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
 )]
 pub(crate) struct Conform {
     #[command(subcommand)]
@@ -77,7 +77,9 @@ enum Other {
 
 /// Compare two reports of conform, for example of an old and a new firmware
 ///
-/// The command lists the cases whose verdict or findings differ. The exit code is 0 if there are none, and 1 otherwise.
+/// The command lists the cases whose verdict or findings differ. Times of the area "timing" differ if a median or mean
+/// changes by more than half and 2 ms, or another figure by more than a factor of 3 and 10 ms. The exit code is 0 if
+/// nothing differs, and 1 otherwise.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge conform diff old.json new.json")]
 struct Diff {

@@ -71,6 +71,7 @@ impl Report for ResultRow {
         Column::new("meaning").data_only(),
         Column::new("not_restored").data_only(),
         Column::new("seconds").data_only(),
+        Column::new("figures").json_only(),
         Column::new("frames").json_only(),
     ];
 
@@ -90,6 +91,11 @@ impl Report for ResultRow {
             if deviates { case.meaning.into() } else { Cell::Null },
             Cell::list(result.not_restored.iter().map(ToString::to_string)),
             Cell::Real(result.length.as_secs_f64(), 3),
+            Cell::Object(
+                record::figures_of(result)
+                    .map(|figure| (figure.statistic.name(), Cell::Real(figure.time.as_secs_f64(), 6)))
+                    .collect(),
+            ),
             Cell::list(frames(&result.transcript)),
         ]
     }
@@ -123,6 +129,7 @@ pub fn summary(report: &ConformReport) -> String {
     let deviates = |result: &CaseResult| matches!(result.verdict, Verdict::Deviates(_));
     let counts = [
         (count(|result| matches!(result.verdict, Verdict::Pass)), "pass"),
+        (count(|result| matches!(result.verdict, Verdict::Measured(_))), "measured"),
         (count(CaseResult::is_new_deviation), "deviate"),
         (report.results.iter().filter(|result| deviates(result) && result.known.is_some()).count(), "known deviations"),
         (count(|result| matches!(result.verdict, Verdict::NotJudged(_))), "not judged"),

@@ -12,7 +12,7 @@ fn known_deviations_are_named_with_their_page_and_are_no_failure() {
         done.stdout
     );
     assert!(done.stdout.starts_with("SDO-01  pass            A read of 1000h"), "{}", done.stdout);
-    assert!(done.stderr.contains("node 1: 118 cases in"), "{}", done.stderr);
+    assert!(done.stderr.contains("node 1: 125 cases in"), "{}", done.stderr);
 }
 
 #[test]
@@ -54,6 +54,30 @@ fn dry_run_lists_the_cases_and_uses_no_bus() {
     bench.run("conform 1 --skip SDO-99").exit(2);
     bench.run("conform 1,2").exit(2);
     bench.run("conform 1 --only everything").exit(2);
+}
+
+#[test]
+fn measured_times_are_figures_and_no_verdict() {
+    let bench = Bench::of("mh4@1");
+    let (html, json) = (bench.path("r.html").display().to_string(), bench.path("r.json").display().to_string());
+    let done = bench.run(&format!("conform 1 --only timing --report {html} --report {json}")).exit(0);
+    assert!(
+        done.stdout.starts_with("TIM-01  measured        The time to answer a read\n        min "),
+        "{}",
+        done.stdout
+    );
+    assert!(done.stderr.ends_with(": 7 measured\n"), "{}", done.stderr);
+    let page = std::fs::read_to_string(&html).expect("the page");
+    assert!(page.contains("<h2>Timing profile</h2>\n<table><tr><th>Case</th><th>What</th><th>min</th>"), "{page}");
+    let text = std::fs::read_to_string(&json).expect("the file");
+    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let heartbeat = report["cases"].as_array().and_then(|cases| cases.iter().find(|case| case["case"] == "TIM-03"));
+    let mean = heartbeat.and_then(|case| case["figures"]["mean"].as_f64()).expect("a mean");
+    assert!((mean - 0.1).abs() < 0.001, "{mean}");
+    // Another run of the same device differs only by noise.
+    let again = bench.path("again.json").display().to_string();
+    bench.run(&format!("conform 1 --only timing --report {again}")).exit(0);
+    bench.run(&format!("conform diff {json} {again}")).prints("");
 }
 
 #[test]

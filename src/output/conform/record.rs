@@ -1,12 +1,13 @@
 //! The report of `conform` for the maker of a device: one HTML page, JSON, or JUnit XML.
 
-use super::words::{finding, page, why_not};
+use super::words::{figure_time, figures, finding, page, statistic, why_not};
 use super::{frames, left, summary};
 use crate::bus::Wall;
 use crate::output::junit::escape;
 use crate::output::text;
-use crate::tasks::conform::{CaseResult, ConformReport, Verdict};
+use crate::tasks::conform::{CaseResult, ConformReport, Figure, Statistic, Verdict};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// A report with the facts that identify the run.
@@ -83,6 +84,7 @@ impl ConformRecord<'_> {
         let known = report.results.iter().filter(|result| result.known.is_some());
         section(&mut html, "Deviations", new);
         section(&mut html, "Deviations that the manual states", known);
+        profile(&mut html, report);
         html.push_str(
             "<h2>All cases</h2>\n<table><tr><th>Case</th><th>Verdict</th><th>What</th><th>Clause</th></tr>\n",
         );
@@ -137,6 +139,7 @@ fn test_case(text: &mut String, report: &ConformReport, result: &CaseResult) {
     );
     let _ = match (&result.verdict, &result.known) {
         (Verdict::Pass, _) => Ok(()),
+        (Verdict::Measured(_), _) => write!(text, "<system-out>{found}</system-out>"),
         (Verdict::Deviates(_), Some(known)) => {
             write!(text, "<system-out>{found}; {}</system-out>", escape(&page(known)))
         }
@@ -151,11 +154,21 @@ fn test_case(text: &mut String, report: &ConformReport, result: &CaseResult) {
 pub(super) fn details(result: &CaseResult) -> Vec<String> {
     match &result.verdict {
         Verdict::Pass => Vec::new(),
+        Verdict::Measured(measured) => vec![figures(measured)],
         Verdict::Deviates(findings) => findings.iter().map(finding).collect(),
         Verdict::NotJudged(why) => vec![why_not(why)],
         Verdict::NotApplicable(why) => vec![why_not(why)],
     }
 }
+
+/// The figures of a case; none if it has another verdict.
+pub(super) fn figures_of(result: &CaseResult) -> impl Iterator<Item = &Figure> {
+    let Verdict::Measured(figures) = &result.verdict else { return [].iter() };
+    figures.iter()
+}
+
+/// Times in seconds by name.
+type Figures = BTreeMap<&'static str, f64>;
 
 fn case(result: &CaseResult) -> Value {
     let case = result.case;
@@ -168,6 +181,7 @@ fn case(result: &CaseResult) -> Value {
         "sentence": case.sentence,
         "clause": case.clause,
         "details": details(result),
+        "figures": figures_of(result).map(|figure| (figure.statistic.name(), figure.time.as_secs_f64())).collect::<Figures>(),
         "frames": frames(&result.transcript),
     })
 }
@@ -197,6 +211,26 @@ fn section<'a>(html: &mut String, title: &str, results: impl Iterator<Item = &'a
             }
         );
     }
+}
+
+/// The table of the measured times.
+fn profile(html: &mut String, report: &ConformReport) {
+    let measured = |result: &&CaseResult| matches!(result.verdict, Verdict::Measured(_));
+    if !report.results.iter().any(|result| measured(&result)) {
+        return;
+    }
+    html.push_str("<h2>Timing profile</h2>\n<table><tr><th>Case</th><th>What</th>");
+    Statistic::ALL.iter().for_each(|one| *html += &format!("<th>{}</th>", statistic(*one)));
+    html.push_str("</tr>\n");
+    for result in report.results.iter().filter(measured) {
+        let _ = write!(html, "<tr><td>{}</td><td>{}</td>", result.case.id, safe(result.case.sentence));
+        for wanted in Statistic::ALL {
+            let found = figures_of(result).find(|figure| figure.statistic == wanted);
+            let _ = write!(html, "<td>{}</td>", found.map(|figure| figure_time(figure.time)).unwrap_or_default());
+        }
+        html.push_str("</tr>\n");
+    }
+    html.push_str("</table>\n");
 }
 
 fn safe(text: &str) -> String {

@@ -3,13 +3,35 @@
 use crate::bus::time::format_duration;
 use crate::output::failure::ErrorMessage;
 use crate::output::text::spaced_bytes;
-use crate::tasks::conform::{Expected, Finding, Seen, WhyNot};
+use crate::tasks::conform::{Expected, Figure, Finding, Seen, Statistic, WhyNot};
 use std::time::Duration;
 
 /// A finding in one line: the object, what was expected, and what was seen.
 pub fn finding(finding: &Finding) -> String {
     let object = finding.object.map(|object| format!("{object}: ")).unwrap_or_default();
     format!("{object}expected {}; seen: {}", expected(&finding.expected), seen(&finding.seen))
+}
+
+/// The figures of a case in one line: `min 0.3 ms, median 0.4 ms, 99 % 0.6 ms, max 0.9 ms`.
+pub(super) fn figures(figures: &[Figure]) -> String {
+    let word = |figure: &Figure| format!("{} {}", statistic(figure.statistic), figure_time(figure.time));
+    figures.iter().map(word).collect::<Vec<_>>().join(", ")
+}
+
+/// The word for a figure.
+pub(super) fn statistic(statistic: Statistic) -> &'static str {
+    match statistic {
+        Statistic::P99 => "99 %",
+        other => other.name(),
+    }
+}
+
+/// A measured time with microseconds if it is short.
+pub(super) fn figure_time(time: Duration) -> String {
+    if time < Duration::from_millis(10) {
+        return format!("{:.3} ms", time.as_secs_f64() * 1000.0);
+    }
+    duration(time)
 }
 
 /// Where the manual states a deviation: `known: the manual states it (page 7)`.

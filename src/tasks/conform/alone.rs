@@ -34,7 +34,7 @@ pub(super) fn others(master: &mut Master<'_>, node: &Node) -> Result<Option<Conf
 }
 
 /// Whether a frame can be from the node.
-fn is_from(node: &Node, frame: &Frame) -> bool {
+pub(super) fn is_from(node: &Node, frame: &Frame) -> bool {
     let id = frame.id();
     let own = [CanId::sdo_response(node.id), CanId::heartbeat(node.id), node.emergency, CanId::LSS_SLAVE];
     let is_own = own.contains(&id) || node.tpdos.iter().any(|tpdo| tpdo.cob_id.can_id() == id);

@@ -25,12 +25,23 @@ pub enum Area {
     Store,
     /// LSS services.
     Lss,
+    /// Answer times, jitter, boot-up times: figures without a verdict.
+    Timing,
 }
 
 impl Area {
     /// All areas, in the order in which they run.
-    pub const ALL: [Area; 8] =
-        [Area::Sdo, Area::Od, Area::Nmt, Area::ErrorControl, Area::Pdo, Area::Emcy, Area::Store, Area::Lss];
+    pub const ALL: [Area; 9] = [
+        Area::Sdo,
+        Area::Od,
+        Area::Nmt,
+        Area::ErrorControl,
+        Area::Pdo,
+        Area::Emcy,
+        Area::Store,
+        Area::Lss,
+        Area::Timing,
+    ];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -43,6 +54,7 @@ impl Area {
             Area::Emcy => "emcy",
             Area::Store => "store",
             Area::Lss => "lss",
+            Area::Timing => "timing",
         }
     }
 
@@ -57,13 +69,14 @@ impl Area {
             Area::Emcy => "emergencies and error history",
             Area::Store => "store and restore",
             Area::Lss => "LSS services",
+            Area::Timing => "timing profile: figures without a verdict",
         }
     }
 
     /// Whether the frames of the area are addressed to the node alone. Other nodes are then not affected.
     pub fn is_local(self) -> bool {
         match self {
-            Area::Sdo | Area::Od | Area::Nmt | Area::ErrorControl | Area::Emcy | Area::Store => true,
+            Area::Sdo | Area::Od | Area::Nmt | Area::ErrorControl | Area::Emcy | Area::Store | Area::Timing => true,
             Area::Pdo | Area::Lss => false,
         }
     }
@@ -160,7 +173,7 @@ pub struct Case {
     pub clause: &'static str,
     /// How much a deviation matters.
     pub severity: Severity,
-    /// What a deviation means to users of the device.
+    /// What a deviation means to users of the device. Empty if the case has no verdict.
     pub meaning: &'static str,
     /// What the case needs.
     pub needs: Needs,

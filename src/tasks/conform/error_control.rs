@@ -55,7 +55,7 @@ pub(super) fn is_near(found: Duration, wanted: Duration) -> bool {
     found.abs_diff(wanted) <= wanted / 20 + Duration::from_millis(3)
 }
 
-fn set_period(session: &mut Session<'_, '_>, period: Duration) -> Result<bool, Error> {
+pub(super) fn set_period(session: &mut Session<'_, '_>, period: Duration) -> Result<bool, Error> {
     let milliseconds = u16::try_from(period.as_millis()).unwrap_or(u16::MAX);
     if session.number(HEARTBEAT_TIME)?.is_none() {
         return Ok(false);

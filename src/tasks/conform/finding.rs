@@ -1,5 +1,6 @@
 //! Verdicts: what was expected, and what was seen. The texts are in `output`.
 
+use super::figure::Figure;
 use crate::canopen::frame::Frame;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
@@ -14,6 +15,8 @@ pub enum Verdict {
     Pass,
     /// The device deviates. There is at least one finding.
     Deviates(Vec<Finding>),
+    /// The case measures times, without a verdict.
+    Measured(Vec<Figure>),
     /// The case was run or tried, without a result.
     NotJudged(Box<WhyNot>),
     /// The device does not have the feature, or the case was not allowed to run.
@@ -186,6 +189,7 @@ impl Verdict {
         match self {
             Verdict::Pass => "pass",
             Verdict::Deviates(_) => "deviates",
+            Verdict::Measured(_) => "measured",
             Verdict::NotJudged(_) => "not-judged",
             Verdict::NotApplicable(_) => "not-applicable",
         }

@@ -9,6 +9,7 @@ mod codes;
 mod emcy;
 mod error_control;
 mod failure;
+mod figure;
 mod finding;
 mod lss;
 mod nmt;
@@ -18,9 +19,11 @@ mod sdo;
 mod session;
 mod settings;
 mod store;
+mod timing;
 
 pub use case::{Area, Case, Needs, Severity};
 pub use failure::{ConformEffect, ConformFailure};
+pub use figure::{Figure, Statistic};
 pub use finding::{Expected, Finding, Seen, Verdict, WhyNot};
 
 use crate::bus::{Filters, Stamp};
@@ -42,7 +45,7 @@ use std::time::Duration;
 pub fn cases() -> impl Iterator<Item = &'static Case> {
     let sdo = [sdo::CASES, sdo::segments::CASES, sdo::general::CASES, sdo::blocks::CASES];
     let others = [od::CASES, nmt::CASES, error_control::CASES, pdo::CASES, pdo::mapping::CASES, pdo::locks::CASES];
-    sdo.into_iter().chain(others).chain([emcy::CASES, store::CASES, lss::CASES]).flatten()
+    sdo.into_iter().chain(others).chain([emcy::CASES, store::CASES, lss::CASES, timing::CASES]).flatten()
 }
 
 /// What to check.

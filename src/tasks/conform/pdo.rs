@@ -154,7 +154,7 @@ fn set_timer(session: &mut Session<'_, '_>, tpdo: Tpdo, timer: Duration) -> Resu
     Ok(false)
 }
 
-fn is_data(received: &Received, id: CanId) -> bool {
+pub(super) fn is_data(received: &Received, id: CanId) -> bool {
     received.frame.id() == id && !received.frame.is_remote()
 }
 
@@ -270,7 +270,7 @@ fn reserved_types(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 }
 
 /// The event timers of the cases. Some devices have a shortest one of 100 ms.
-const TIMER: Duration = Duration::from_millis(100);
+pub(super) const TIMER: Duration = Duration::from_millis(100);
 const INTERVALS: u32 = 8;
 
 fn period(session: &mut Session<'_, '_>, tpdo: Tpdo, wanted: Duration) -> Result<Option<Finding>, Error> {
@@ -286,7 +286,7 @@ fn period(session: &mut Session<'_, '_>, tpdo: Tpdo, wanted: Duration) -> Result
 const NO_TIMER: Verdict = Verdict::NotApplicable(WhyNot::NoEventTimer);
 
 /// A TPDO that is sent by its event timer, in OPERATIONAL.
-fn timed(session: &mut Session<'_, '_>) -> Result<Result<Tpdo, Verdict>, Error> {
+pub(super) fn timed(session: &mut Session<'_, '_>) -> Result<Result<Tpdo, Verdict>, Error> {
     let Some(tpdo) = prepare(session)? else { return Ok(Err(NO_TPDO)) };
     if !set_timer(session, tpdo, TIMER)? {
         return Ok(Err(NO_TIMER));

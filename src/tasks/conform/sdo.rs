@@ -149,7 +149,7 @@ fn unknown_command(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 }
 
 /// A writable number of one or two bytes that may be written with its own value.
-fn narrow_setting(session: &mut Session<'_, '_>) -> Result<Option<(ObjectId, Vec<u8>)>, Error> {
+pub(super) fn narrow_setting(session: &mut Session<'_, '_>) -> Result<Option<(ObjectId, Vec<u8>)>, Error> {
     let candidates = [HEARTBEAT_TIME, ObjectId::new(0x1015, 0), ObjectId::new(0x1800, 5), ObjectId::new(0x1800, 2)];
     for object in candidates {
         if let Some(value) = session.read(object)?.filter(|value| value.len() <= 2)

@@ -71,12 +71,17 @@ impl Session<'_, '_> {
 
     /// The same with another time-out.
     pub(super) fn raw_within(&mut self, data: [u8; 8], timeout: Duration) -> Result<Option<Frame>, Error> {
+        Ok(self.raw_received(data, timeout)?.map(|received| received.frame))
+    }
+
+    /// The same with the time of the answer.
+    pub(super) fn raw_received(&mut self, data: [u8; 8], timeout: Duration) -> Result<Option<Received>, Error> {
         let id = self.node.id;
         let frame = Frame::full(CanId::sdo_request(id), data);
         self.is_answer_open = true;
         let answer = self.master.exchange(frame, CanId::sdo_response(id), timeout)?;
         self.is_answer_open = answer.is_none();
-        Ok(answer.map(|received| received.frame))
+        Ok(answer)
     }
 
     /// Sends an initiate upload. Returns the answer.
@@ -88,12 +93,17 @@ impl Session<'_, '_> {
     /// Sends an expedited download in the form that the device uses. The object is restored after the case.
     pub(super) fn download(&mut self, object: ObjectId, bytes: &[u8]) -> Result<Option<Frame>, Error> {
         self.touch(object)?;
+        self.raw(self.download_request(object, bytes))
+    }
+
+    /// An expedited download in the form that the device uses.
+    pub(super) fn download_request(&self, object: ObjectId, bytes: &[u8]) -> [u8; 8] {
         let mut data = [0; 4];
         let length = bytes.len().min(4);
         data[..length].copy_from_slice(&bytes[..length]);
         let unused = u8::try_from(4 - length).unwrap_or(0);
         let command = if self.omits_sizes() { 0x22 } else { 0x23 | unused << 2 };
-        self.raw(request(command, object, data))
+        request(command, object, data)
     }
 
     /// Whether the device expects downloads without a size.
