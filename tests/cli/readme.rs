@@ -15,7 +15,7 @@ use std::process::Command;
 const PICTURE: [&str; 4] = [
     "cangauge -b sim scan",
     "cangauge -b sim read 1,127",
-    "cangauge -b sim log 127 --duration 6s --plot -o run.csv",
+    "cangauge -b sim log 1,127 pressure --sync 100ms --duration 6s -o run.csv",
     "cangauge -b sim check 1 'pressure in 0.5..2 bar' 'temperature < 20 degC'",
 ];
 
