@@ -23,7 +23,7 @@ use clap::Args;
 /// Before the write it checks these conditions. If one of them is not met, it changes nothing and exits with 1. Each
 /// reading must be valid. The sensor must not measure absolute pressure. The mean must be within the limit. The
 /// readings may vary by at most 0.5 % of the measuring range (half of the limit if the range is unknown). The total
-/// offset may be at most 5 % of the range (or a larger --limit).
+/// offset may be at most 5 % of the range, or at most --limit if that is larger.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim autozero 1 --limit 2bar --samples 2 --dry-run\n  cangauge -b sim autozero 1 --limit 2bar --samples 2 --store\n  cangauge -b sim autozero 127 --limit 25% --samples 2 --format json"

@@ -24,11 +24,11 @@ use std::sync::Arc;
 
 /// Print or install the completion script for a shell
 ///
-/// "install" writes the script to the folder of the user for bash, zsh or fish, and prints its path.
+/// "install" writes the script for bash, zsh or fish to the folder where this shell looks for it, and prints its path.
 ///
 /// The script completes commands, options, buses, and the names of devices, units, signals and objects. Signals and
-/// objects are those of --device and --eds. Without these options, they are those of the built-in descriptions. The
-/// script uses no bus.
+/// objects are taken from --device and --eds, or from the built-in descriptions if neither option is given. The script
+/// uses no bus.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge completions install\n  cangauge completions bash > cangauge.bash")]
 pub(crate) struct Completions {

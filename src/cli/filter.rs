@@ -20,8 +20,8 @@ use clap::{Args, ValueEnum};
 pub(crate) struct Filter {
     /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// Signal: pressure, temperature, ch1 to ch16; several: ch1-ch4, ch1,ch3, all [default: all; when setting: the
-    /// only signal with a filter]
+    /// Signal: pressure, temperature, ch1 to ch16; several: ch1-ch4, ch1,ch3, all [default: all]. To set
+    /// a filter, SIGNAL is needed if several signals have a filter
     signal: Option<String>,
     /// Filter type
     #[arg(long = "type", value_name = "TYPE")]

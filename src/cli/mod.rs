@@ -153,8 +153,8 @@ pub struct Global {
     #[arg(long, global = true)]
     pub(crate) accept_mismatch: bool,
 
-    /// Limit the total bus load: SDO requests of set-up, scan, polling and config apply are delayed above it [default:
-    /// 50% while other nodes send, otherwise no limit]
+    /// Highest total bus load: SDO requests wait while the load is higher [default: 50% while other nodes send,
+    /// otherwise no limit]
     #[arg(long, global = true, value_name = "SHARE")]
     pub(crate) max_load: Option<Load>,
 

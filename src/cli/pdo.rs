@@ -109,7 +109,7 @@ fn transmission(text: &str) -> Result<Trigger, String> {
     })
 }
 
-/// A duration as a number of `unit`s of at most 16 bits.
+/// Parses a duration as a 16-bit number of `unit`s.
 fn units(text: &str, unit: std::time::Duration, form: &str) -> Result<u16, String> {
     let wrong = || match text.parse::<f64>() {
         Ok(_) => format!("\"{text}\" has no unit ({text}ms): it must be {form}"),
@@ -228,7 +228,7 @@ impl WatchArgs {
                 claims.take();
                 match *event {
                     WatchEvent::Restarted(node) => {
-                        // A recording shows only what other masters read again.
+                        // In a recording, the mapping is known only after another master has read it again.
                         let mapping =
                             if is_live { "assumed to be unchanged" } else { "unknown until it is read again" };
                         console.warn(&format!("node {node} restarted; its mapping is {mapping}"));
@@ -272,7 +272,7 @@ impl WatchArgs {
     }
 }
 
-/// Prints how a TPDO of a wrong length is shown, and how many there were.
+/// Reports a TPDO of a wrong length, or at the end the number of such TPDOs.
 fn print_wrong_length(console: &Console, event: &WatchEvent<'_>) {
     match *event {
         WatchEvent::WrongLength { node, number, mapped, length, is_used } => {

@@ -21,7 +21,7 @@ pub(super) const SCAN_TIMEOUT: Duration = Duration::from_millis(200);
 /// List every node that answers, with its state, identity and recognised device
 ///
 /// The device types of all nodes are read at the same time. If a node does not answer, the read is repeated once. The
-/// state is that of the heartbeat, and "-" if the node sends no heartbeat.
+/// state is read from the heartbeat. It is "-" if the node sends no heartbeat.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim scan\n  cangauge -b sim scan 1-16 --format json")]
 pub(crate) struct Scan {

@@ -83,8 +83,7 @@ struct WriteArgs {
     /// Encode the value as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
     data_type: Option<DataType>,
-    /// Include the size in the request. auto follows the description; if the device rejects this form, the other form
-    /// is sent
+    /// Whether the request contains the data size. With auto, if the device rejects one form, the other form is sent
     #[arg(long, value_name = "HOW", default_value = "auto")]
     sdo_size: SdoSize,
     /// Read back and compare

@@ -107,7 +107,7 @@ impl Rows {
         self.sink.change_columns(Columns::Wide(wide.columns()))
     }
 
-    /// Another device follows: starts the next file, if rows were written to a file.
+    /// Starts the next file for the next device, if rows were written to a file.
     ///
     /// # Errors
     /// A row cannot be written.

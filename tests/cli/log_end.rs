@@ -177,7 +177,7 @@ fn overload_is_reported_at_once() {
     let text = "warning: node 5: emergency F001h, user input overload";
     assert!(done.stderr.lines().any(|line| line.starts_with(text)), "{}", done.stderr);
     // (1 SYNC of at most 50 bits and 1 TPDO of at most 135) in 10 ms, of 250 kbit/s.
-    assert!(done.stderr.starts_with("SYNC every 10 ms with its TPDOs takes 7.4 % of the bus\n"), "{}", done.stderr);
+    assert!(done.stderr.starts_with("SYNC every 10 ms and its TPDOs use 7.4 % of the bus\n"), "{}", done.stderr);
     assert!(done.stderr.contains("node 5: emergency over (0000h)"), "{}", done.stderr);
     assert!(done.stderr.contains("  INVALID\n") && done.stderr.contains("     10 ms       10\n"), "{}", done.stderr);
 }

@@ -73,7 +73,7 @@ fn full_disk_is_exit_8() {
     let bench = Bench::of("mh4@1");
     bench.run("log 1 --sync 10ms --count 5 -o /dev/full").fails(
         8,
-        "SYNC every 10 ms with its TPDOs takes 7.4 % of the bus\nwarning: 5 rows could not be written\ncangauge: write /dev/full: No space left on device (os error 28)\n",
+        "SYNC every 10 ms and its TPDOs use 7.4 % of the bus\nwarning: 5 rows could not be written\ncangauge: write /dev/full: No space left on device (os error 28)\n",
     );
     // The error ends the recording, and the state of the node is restored.
     let heartbeat = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x1017\" = 100 }\n");

@@ -16,15 +16,15 @@ const DAY: Duration = Duration::from_secs(24 * 3600);
 /// 1970-01-01 in days since 1899-12-30, the first day of PEAK.
 const FIRST_DAY: Duration = Duration::from_secs(25_569 * 24 * 3600);
 
-/// The identifier of a bus state.
+/// The identifier of a line that contains a bus state.
 const BUS_STATE: &str = "FFFFFFFF";
 
 pub(super) struct Trc {
     zone: TimeZone,
     columns: String,
-    /// The time of the start on the clock of the machine that recorded, as if it were UTC.
+    /// The start of the recording, in the local time of the recording computer or in UTC (`is_utc`).
     clock: Option<Duration>,
-    /// Whether that clock shows UTC.
+    /// Whether `clock` is UTC.
     is_utc: bool,
     start: Option<Duration>,
 }
@@ -45,7 +45,7 @@ impl Trc {
         } else if let Some(time) = text.trim_start().strip_prefix("Start time:") {
             self.start = date(time, self.zone);
         } else if text.contains("python-can") {
-            // PEAK writes the local time.
+            // python-can writes UTC; PEAK writes the local time.
             self.is_utc = true;
         }
     }
@@ -53,7 +53,7 @@ impl Trc {
     /// When the recording started, since 1970; zero if unknown.
     fn start(&mut self) -> Duration {
         let Some(clock) = self.clock.take() else { return *self.start.get_or_insert_default() };
-        // Ten digits of a day resolve 9 us; further digits are rounded to the microsecond.
+        // Ten decimal digits of a day have a resolution of 9 us. More digits are rounded to 1 us.
         let micros = (clock + Duration::from_nanos(500)).as_micros();
         let clock = Duration::from_micros(u64::try_from(micros).unwrap_or(u64::MAX));
         let (days, second) = (clock.as_secs() / DAY.as_secs(), clock.as_secs() % DAY.as_secs());

@@ -120,7 +120,7 @@ impl fmt::Display for Firmware {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.version {
             Some(version) => write!(f, "the adapter ({})", crate::bus::stream::printable(version)),
-            None => f.write_str("an adapter without a known version"),
+            None => f.write_str("the adapter (version unknown)"),
         }
     }
 }

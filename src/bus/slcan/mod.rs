@@ -157,7 +157,8 @@ impl Slcan {
         let rate = self.firmware.rate(bit_rate).ok_or_else(|| {
             let adapter = &self.firmware;
             format!(
-                "{adapter} is not known to have {bit_rate} bit/s (all have 10k, 20k, 50k, 100k, 125k, 250k, 500k, 1M)"
+                "cannot confirm that {adapter} supports {bit_rate} bit/s (every adapter supports 10k, 20k, 50k, 100k, 125k, \
+                 250k, 500k, 1M)"
             )
         })?;
         let mut steps = vec![Step::Rate(rate), Step::Stamps];
@@ -168,7 +169,9 @@ impl Slcan {
         steps.push(match (mode, listen_only) {
             (Mode::Normal, _) | (Mode::ListenOnly, Some(ListenOnly::SilentMode)) => Step::Open,
             (Mode::ListenOnly, Some(ListenOnly::OtherOpen)) => Step::Listen,
-            (Mode::ListenOnly, None) => return Err(format!("{} {NO_LISTEN_ONLY}", self.firmware)),
+            (Mode::ListenOnly, None) => {
+                return Err(format!("cannot confirm that {} supports listen-only mode", self.firmware));
+            }
         });
         steps.push(Step::Flags);
         Ok(steps)
@@ -334,9 +337,6 @@ impl Slcan {
         }
     }
 }
-
-/// The end of the error message about an adapter without a listen-only mode.
-const NO_LISTEN_ONLY: &str = "is not known to have a listen-only mode";
 
 /// Parses the answer to `F`: `F04`.
 fn flags(text: &str) -> Option<u8> {

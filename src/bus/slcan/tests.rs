@@ -5,7 +5,7 @@ fn at(mono: Duration) -> Stamp {
     Stamp { mono: Mono::at(mono), wall: Wall::at(Duration::from_secs(1_436_509_052) + mono) }
 }
 
-/// An adapter written from the command set of the LAWICEL manuals.
+/// A simulated adapter with the command set of the LAWICEL manuals.
 #[derive(Clone, Default)]
 struct Adapter {
     /// Whether the adapter never answers.
@@ -18,7 +18,7 @@ struct Adapter {
     version: [&'static str; 3],
     /// Rejected commands.
     rejects: Vec<&'static str>,
-    /// The number of next frames that are rejected.
+    /// How many of the next frames are rejected.
     is_full_for: u32,
     /// The time after a command in which further commands are lost.
     busy: Duration,
@@ -177,11 +177,14 @@ fn rates_and_modes_that_are_not_certain_are_refused() {
     let unknown = || Adapter { version: ["Vx", "", ""], ..Adapter::lawicel() };
     let error = |adapter, bit_rate, mode| Bench::opened(adapter, bit_rate, Some(mode)).err().expect("an error");
     let why = error(unknown(), 800_000, Mode::Normal);
-    assert!(why.starts_with("the adapter (Vx) is not known to have 800000 bit/s"), "{why}");
-    assert_eq!(error(unknown(), 250_000, Mode::ListenOnly), "the adapter (Vx) is not known to have a listen-only mode");
+    assert!(why.starts_with("cannot confirm that the adapter (Vx) supports 800000 bit/s"), "{why}");
+    assert_eq!(
+        error(unknown(), 250_000, Mode::ListenOnly),
+        "cannot confirm that the adapter (Vx) supports listen-only mode"
+    );
     let silent = Adapter { is_silent: true, ..Adapter::default() };
     let why = error(silent, 250_000, Mode::ListenOnly);
-    assert_eq!(why, "an adapter without a known version is not known to have a listen-only mode");
+    assert_eq!(why, "cannot confirm that the adapter (version unknown) supports listen-only mode");
     let rejecting = Adapter { rejects: vec!["S8"], ..Adapter::lawicel() };
     assert_eq!(error(rejecting, 1_000_000, Mode::Normal), "the adapter (V1013) rejects the bit rate 1000000");
     let mut bench = Bench::opened(Adapter::lawicel(), 250_000, Some(Mode::ListenOnly)).expect("opened");

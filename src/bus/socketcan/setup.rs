@@ -25,7 +25,7 @@ pub struct Change {
 /// # Errors
 /// There is no interface of that name, or it is not a CAN interface.
 pub fn link(name: &str) -> Result<Link, BusError> {
-    let link = netlink::get(name).map_err(|refusal| refusal.into_error(&format!("ask about {name}"), name))?;
+    let link = netlink::get(name).map_err(|refusal| refusal.into_error(&format!("read the state of {name}"), name))?;
     if link.is_can { Ok(link) } else { Err(BusError::NotCan(name.to_owned())) }
 }
 
@@ -169,7 +169,7 @@ fn is_possible(name: &str, link: &Link, bit_rate: u32) -> Result<(), BusError> {
     let why = match &link.fixed_rates {
         Some(rates) if !rates.is_empty() && !rates.contains(&bit_rate) => {
             let rates: Vec<String> = rates.iter().map(u32::to_string).collect();
-            format!("it has {}", rates.join(", "))
+            format!("it supports {}", rates.join(", "))
         }
         _ => match link.rate_max {
             Some(highest) if bit_rate > highest => format!("its highest is {highest} bit/s"),
@@ -199,7 +199,7 @@ fn no_listening(name: &str) -> BusError {
 
 fn unchanged(name: &str, what: &str) -> BusError {
     let source = std::io::Error::other(what.to_owned());
-    BusError::Io { what: format!("the kernel accepted the change of {name} without effect"), source }
+    BusError::Io { what: format!("the change of {name} had no effect"), source }
 }
 
 /// Explains why the kernel rejected a bit rate.

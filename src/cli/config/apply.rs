@@ -67,9 +67,9 @@ pub(super) struct Apply {
     /// placeholder {NAME} in the settings file. A device that is not in the table is not changed
     #[arg(long, value_name = "FILE.csv", conflicts_with = "rollback")]
     table: Option<PathBuf>,
-    /// Set devices that are plugged in one after the other, each with the values of its row. Includes --address and
-    /// --store. The result is written to the column "result" of the table. If you type the serial number on the label
-    /// before you plug in the device, it is compared with that of the device
+    /// Configure devices that you plug in one after the other, each with the values of its row. Includes --address and
+    /// --store. The result is written to the column "result" of the table. Before you plug in a device, you can type the
+    /// serial number on its label: it is compared with the serial number in the device
     #[arg(long, requires = "table", conflicts_with = "dry_run")]
     prompt: bool,
     /// Write a report: time, devices, old and new values, verification. It is HTML if the name ends with .html, else

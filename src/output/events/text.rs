@@ -93,7 +93,7 @@ fn times_more(count: u64) -> String {
 }
 
 fn share_text(interval: Duration, share: f64) -> String {
-    format!("SYNC every {} with its TPDOs takes {:.1} % of the bus", format_duration(interval), share * 100.0)
+    format!("SYNC every {} and its TPDOs use {:.1} % of the bus", format_duration(interval), share * 100.0)
 }
 
 fn length_text(node: NodeId, mapped: usize, received: usize, consequence: &str) -> String {

@@ -1,4 +1,4 @@
-//! Text for causes: an interface of this computer was not set.
+//! Messages and hints if a CAN interface of this computer cannot be set.
 
 use super::CauseText;
 use crate::tasks::host::{HostAction, HostFailure};

@@ -191,7 +191,7 @@ impl DeviceEntry {
         DeviceEntry { kind: kind.to_owned(), node, constant, ..DeviceEntry::default() }
     }
 
-    /// Whether it is not on the bus all the time.
+    /// Whether the device is connected only for a part of the time.
     pub(super) fn is_plugged(&self) -> bool {
         self.connected.is_some()
     }
@@ -204,7 +204,8 @@ impl DeviceEntry {
         }
     }
 
-    /// `before` is the number of previous devices of this kind, because each device has its own serial number.
+    /// `before` is the number of previous devices of this kind. It is added to the serial number, so that each device
+    /// has its own.
     pub(super) fn setup(&self, seed: u64, before: u32, beside: &Path) -> Result<Setup, BenchError> {
         let mut setup = Setup::new(self.model(beside)?, self.node.unwrap_or(NodeId::MIN));
         setup.node = self.node;
@@ -306,7 +307,7 @@ fn points(path: &Path) -> Result<Form, BenchError> {
             None if index == 0 => {}
             _ => {
                 let line = index + 1;
-                let message = "not SECONDS,VALUE with a later time than the line before";
+                let message = "expected SECONDS,VALUE, with a later time than in the previous line";
                 return Err(BenchError::Usage(format!("{}:{line}: {message}", path.display())));
             }
         }

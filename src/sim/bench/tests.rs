@@ -293,7 +293,7 @@ fn quantities_follow_a_ramp_or_a_file() {
     let error = |keys: &str| bench(keys).err().expect("an error").to_string();
     assert!(
         error("csv = \"wrong.csv\"\n")
-            .ends_with("wrong.csv:3: not SECONDS,VALUE with a later time than the line before")
+            .ends_with("wrong.csv:3: expected SECONDS,VALUE, with a later time than in the previous line")
     );
     assert!(error("csv = \"absent.csv\"\n").contains("absent.csv"));
     assert!(error("form = \"square\"\n").contains("unknown variant"));

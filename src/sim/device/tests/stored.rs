@@ -49,10 +49,10 @@ fn a_store_between_restore_and_reset_keeps_the_old_values() {
             let answer = ask(&mut bus, &frame).pop().expect("an answer");
             assert!(answer.starts_with("585#60"), "{kind}: {answer}");
         }
-        assert_eq!(read(&mut bus), format!("585#{answers}316101{kpa}"), "{kind}: restored, and works on as before");
+        assert_eq!(read(&mut bus), format!("585#{answers}316101{kpa}"), "{kind}: unchanged until the reset");
         ask(&mut bus, "605#2210100173617665");
         assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
-        assert_eq!(read(&mut bus), format!("585#{answers}316101{kpa}"), "{kind}: the store took the restore back");
+        assert_eq!(read(&mut bus), format!("585#{answers}316101{kpa}"), "{kind}: the store cancels the restore");
         // Without the store, the restore is effective.
         ask(&mut bus, "605#221110016C6F6164");
         assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
@@ -67,7 +67,7 @@ fn mh4_store_all_resets_the_cob_ids() {
         ask(&mut bus, "605#23001801850100C0");
         ask(&mut bus, "605#23001801AA010040");
         assert_eq!(ask(&mut bus, &format!("605#231010{sub}73617665")), [format!("585#601010{sub}00000000")]);
-        assert_eq!(ask(&mut bus, "605#4000180100000000"), ["585#43001801AA010040"], "until the reset it works");
+        assert_eq!(ask(&mut bus, "605#4000180100000000"), ["585#43001801AA010040"], "unchanged until the reset");
         ask(&mut bus, "000#8105");
         let until = bus.now().mono + Duration::from_millis(150);
         receive(&mut bus, until);
@@ -87,7 +87,7 @@ fn new_node_id_resets_the_cob_ids_of_the_mc1609() {
         ask(&mut bus, "605#23001801AA010040");
         ask(&mut bus, "605#2314100090000000");
         assert_eq!(ask(&mut bus, if kind == "mh4" { "605#2310100273617665" } else { "605#2310100173617665" }).len(), 1);
-        // A write of the same node-ID does not change the COB-IDs.
+        // A reset with the same node-ID does not change the COB-IDs.
         assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
         assert_eq!(ask(&mut bus, "605#4000180100000000"), ["585#43001801AA010040"], "{kind}");
         play(
