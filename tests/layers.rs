@@ -76,6 +76,8 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("indicatif", &["output"]),
     ("noto_sans_mono_bitmap", &["output"]),
     ("libc", &["bus"]),
+    ("rustls", &["publish"]),
+    ("rustls_native_certs", &["publish"]),
     ("ryu", &["output"]),
     ("serde_json", &["output", "publish"]),
     ("signal_hook", &["bus"]),

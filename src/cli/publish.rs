@@ -17,6 +17,7 @@ use crate::publish::service::Service;
 use crate::publish::sink::{Sink, Trouble};
 use crate::publish::spool::{Spool, Start};
 use crate::publish::target::{Scheme, Secret, Target};
+use crate::publish::tls::Trust;
 use crate::tasks::Kind;
 use clap::{Args, ValueEnum};
 use std::collections::BTreeSet;
@@ -53,6 +54,7 @@ Servers:
   influx://HOST[:8086]/DATABASE    InfluxDB 1 and databases with its protocol
   influx://HOST[:8086]/ORG/BUCKET  InfluxDB 2
   mqtt://HOST[:1883][/PREFIX]      MQTT 3.1.1, QoS 1 [default prefix: cangauge]
+  influx+https://, mqtts://        the same with TLS (ports 8086 and 8883)
 
 Files:
   run.csv.SERVER.pos       the position (see --status)
@@ -85,8 +87,11 @@ pub(crate) struct Publish {
     /// File with a token or with USER:PASSWORD [default: the environment variable CANGAUGE_TOKEN]
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
+    /// With TLS: trust only these certificates of authorities [default: those of the system]
+    #[arg(long, value_name = "FILE")]
+    ca: Option<PathBuf>,
     /// Show how far the recordings are published, and send nothing
-    #[arg(long, conflicts_with_all = ["to", "follow", "tag", "identity", "token_file"])]
+    #[arg(long, conflicts_with_all = ["to", "follow", "tag", "identity", "token_file", "ca"])]
     status: bool,
 }
 
@@ -109,7 +114,11 @@ impl Publish {
             return self.print_status(global);
         }
         let target = Target::parse(self.to.as_deref().unwrap_or_default()).map_err(texts::target_error)?;
+        if self.ca.is_some() && !target.tls {
+            return Err(ErrorMessage::usage("--ca needs an address with TLS: influx+https:// or mqtts://").into());
+        }
         let secret = self.secret()?;
+        let trust = target.tls.then(|| Trust::load(self.ca.as_deref())).transpose().map_err(texts::trust_error)?;
         let options = Options {
             follow: self.follow,
             start: if self.from == From::End { Start::End } else { Start::Start },
@@ -123,7 +132,7 @@ impl Publish {
         let mut interrupts = Interrupts::new().map_err(failed)?;
         let clock = HostClock::new();
         let open = |file: &PathBuf| {
-            let sink = sink(&target, secret.as_ref(), timeout);
+            let sink = sink(&target, secret.as_ref(), timeout, trust.as_ref());
             let opened =
                 Publisher::open(file, &target.name(), &target.to_string(), sink, options.clone(), clock.now().wall);
             let about = Progress { file: file.display().to_string(), url: target.to_string(), ..Progress::default() };
@@ -178,10 +187,10 @@ impl Publish {
     }
 }
 
-fn sink(target: &Target, secret: Option<&Secret>, timeout: Duration) -> Box<dyn Sink> {
+fn sink(target: &Target, secret: Option<&Secret>, timeout: Duration, trust: Option<&Trust>) -> Box<dyn Sink> {
     match target.scheme {
-        Scheme::Influx => Box::new(Influx::new(target, secret, timeout)),
-        Scheme::Mqtt => Box::new(Mqtt::new(target, secret, timeout)),
+        Scheme::Influx => Box::new(Influx::new(target, secret, timeout, trust)),
+        Scheme::Mqtt => Box::new(Mqtt::new(target, secret, timeout, trust)),
     }
 }
 
@@ -245,7 +254,7 @@ impl View<'_> {
     fn print_trouble(&mut self, trouble: &Trouble) {
         let text = texts::trouble_text(trouble);
         if self.troubles.insert(text.clone()) {
-            self.global.console().warn(&texts::waiting_text(&self.url, &text));
+            self.global.console().warn(&texts::waiting_text(&self.url, trouble));
         }
     }
 

@@ -1,5 +1,7 @@
 //! The state of publishers, and the texts of their events and failures.
 
+mod tls;
+
 use super::failure::ErrorMessage;
 use super::report::{Cell, Column, Report};
 use super::text::grouped;
@@ -10,6 +12,8 @@ use crate::publish::spool::SpoolEvent;
 use crate::publish::target::TargetError;
 use crate::tasks::Kind;
 use std::path::Path;
+
+pub use tls::trust_error;
 
 /// The state of one recording at one server.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -134,12 +138,17 @@ pub fn trouble_text(trouble: &Trouble) -> String {
         Trouble::Status(status, words) => format!("{words} (HTTP status {status})"),
         Trouble::RejectsEverything(words) => format!("the server rejects every row: {words}"),
         Trouble::Refused(code) => format!("the broker refuses the connection (return code {code})"),
+        Trouble::Certificate(fault) => tls::certificate_text(fault),
+        Trouble::Tls(fault) => tls::fault_text(fault),
     }
 }
 
 /// The warning when a server does not accept rows.
-pub fn waiting_text(url: &str, trouble: &str) -> String {
-    format!("{url}: {trouble}; trying again")
+pub fn waiting_text(url: &str, trouble: &Trouble) -> String {
+    // A service has no failure with a hint.
+    let hint = trouble_hint(trouble).filter(|_| trouble.is_lasting());
+    let hint = hint.map(|hint| format!(" ({hint})")).unwrap_or_default();
+    format!("{url}: {}{hint}; trying again", trouble_text(trouble))
 }
 
 /// The note when it accepts rows again.
@@ -158,6 +167,8 @@ fn trouble_hint(trouble: &Trouble) -> Option<&'static str> {
         Trouble::NotDatabase(_) | Trouble::Garbage | Trouble::RejectsEverything(_) => {
             "check the address: it must be the port of the database"
         }
+        Trouble::Certificate(fault) => tls::certificate_hint(fault),
+        Trouble::Tls(_) => "check the port: without TLS, the address begins with influx:// or mqtt://",
         _ => return None,
     })
 }
@@ -165,7 +176,7 @@ fn trouble_hint(trouble: &Trouble) -> Option<&'static str> {
 fn trouble_kind(trouble: &Trouble) -> Kind {
     match trouble {
         Trouble::NoConnection(_) | Trouble::Timeout | Trouble::Closed => Kind::NoAnswer,
-        Trouble::Garbage | Trouble::NotDatabase(_) => Kind::Unexpected,
+        Trouble::Garbage | Trouble::NotDatabase(_) | Trouble::Certificate(_) | Trouble::Tls(_) => Kind::Unexpected,
         _ => Kind::Refused,
     }
 }
@@ -239,7 +250,8 @@ pub fn rejected(progress: &Progress, rejects: &Path) -> Option<ErrorMessage> {
 
 /// A wrong address. The address is not shown, because it may contain a secret.
 pub fn target_error(error: TargetError) -> ErrorMessage {
-    let forms = "use influx://HOST/DATABASE, influx://HOST/ORGANISATION/BUCKET or mqtt://HOST";
+    let forms = "use influx://HOST/DATABASE, influx://HOST/ORGANISATION/BUCKET or mqtt://HOST; with TLS, influx+https:// \
+                 or mqtts://";
     let (message, hint) = match error {
         TargetError::Credentials => (
             "--to must not contain a user name or a password: other users can see the command line",
@@ -251,10 +263,6 @@ pub fn target_error(error: TargetError) -> ErrorMessage {
         TargetError::Scheme => ("--to has an unknown kind of server", forms),
         TargetError::Host => ("--to has no valid host and port", forms),
         TargetError::Database => ("--to names no database", forms),
-        TargetError::Tls => (
-            "--to needs TLS, which this program does not contain",
-            "use influx:// or mqtt:// in a trusted network, or through a tunnel (ssh -L)",
-        ),
         TargetError::Topic => ("--to contains a wildcard of MQTT", forms),
     };
     ErrorMessage::usage(message).hint(hint)

@@ -1,8 +1,9 @@
 //! InfluxDB line protocol over HTTP: InfluxDB 1 (`/write`) and 2 (`/api/v2/write`), and databases that accept the same.
 
 use super::line_protocol::{Line, head, push_line};
-use super::sink::{Record, Rejection, SendError, Sink, Trouble, io_trouble};
+use super::sink::{Record, Rejection, SendError, Sink, TlsFault, Trouble, io_trouble};
 use super::target::{Secret, Target, percent_encoded};
+use super::tls::Trust;
 use crate::bus::Wall;
 use std::io::Read;
 use std::time::Duration;
@@ -29,34 +30,37 @@ pub struct Influx {
 }
 
 impl Influx {
-    /// A database at this address. `timeout` is the longest time of a request.
-    pub fn new(target: &Target, secret: Option<&Secret>, timeout: Duration) -> Influx {
-        let config = Agent::config_builder()
+    /// A database at this address. `timeout` is the longest time of a request. With `trust`, the connection uses TLS.
+    pub fn new(target: &Target, secret: Option<&Secret>, timeout: Duration, trust: Option<&Trust>) -> Influx {
+        let mut config = Agent::config_builder()
             .http_status_as_error(false)
             // A redirection could take the token to another server.
             .max_redirects(0)
             .max_redirects_will_error(false)
             .timeout_global(Some(timeout))
             .proxy(None)
-            .user_agent(concat!("cangauge/", env!("CARGO_PKG_VERSION")))
-            .build();
-        let (place, path) = (format!("{}:{}", target.host, target.port), target.path.as_slice());
+            .user_agent(concat!("cangauge/", env!("CARGO_PKG_VERSION")));
+        if let Some(trust) = trust {
+            config = trust.configure(config);
+        }
+        let scheme = if trust.is_some() { "https" } else { "http" };
+        let (place, path) = (format!("{scheme}://{}:{}", target.host, target.port), target.path.as_slice());
         let url = match path {
             [org, bucket] => format!(
-                "http://{place}/api/v2/write?org={}&bucket={}&precision=ns",
+                "{place}/api/v2/write?org={}&bucket={}&precision=ns",
                 percent_encoded(org),
                 percent_encoded(bucket)
             ),
             _ => {
                 let database = path.first().map(String::as_str).unwrap_or_default();
-                format!("http://{place}/write?db={}&precision=ns", percent_encoded(database))
+                format!("{place}/write?db={}&precision=ns", percent_encoded(database))
             }
         };
         let authorization = secret.map(|secret| match secret.user_and_password() {
             Some(_) => format!("Basic {}", base64(secret.text().as_bytes())),
             None => format!("Token {}", secret.text()),
         });
-        Influx { agent: Agent::new_with_config(config), url, authorization, heads: Vec::new() }
+        Influx { agent: Agent::new_with_config(config.build()), url, authorization, heads: Vec::new() }
     }
 
     fn head(&mut self, record: &Record<'_>) -> &[u8] {
@@ -116,6 +120,7 @@ fn trouble(error: &ureq::Error) -> Trouble {
         ureq::Error::HostNotFound => Trouble::NoConnection("the host is unknown".to_owned()),
         ureq::Error::ConnectionFailed => Trouble::NoConnection("the connection failed".to_owned()),
         ureq::Error::Io(error) => io_trouble(error),
+        ureq::Error::Tls(words) => Trouble::Tls(TlsFault::Refused((*words).to_owned())),
         _ => Trouble::Garbage,
     }
 }
@@ -189,7 +194,7 @@ mod tests {
     #[test]
     fn lines_have_the_tags_of_their_origin() {
         let target = Target::parse("influx://lab1/db").expect("an address");
-        let mut influx = Influx::new(&target, None, Duration::from_secs(1));
+        let mut influx = Influx::new(&target, None, Duration::from_secs(1), None);
         let pair = |key: &str, value: &str| (key.to_owned(), value.to_owned());
         let origin = Origin {
             id: 1,
@@ -220,12 +225,12 @@ mod tests {
 
     #[test]
     fn paths_of_both_versions() {
-        let url = |text: &str| Influx::new(&Target::parse(text).expect(text), None, Duration::from_secs(1)).url;
+        let url = |text: &str| Influx::new(&Target::parse(text).expect(text), None, Duration::from_secs(1), None).url;
         assert_eq!(url("influx://lab1/a b"), "http://lab1:8086/write?db=a%20b&precision=ns");
         assert_eq!(url("influx://[::1]:80/o/b"), "http://[::1]:80/api/v2/write?org=o&bucket=b&precision=ns");
         let secret = |text: &str| {
             let target = Target::parse("influx://lab1/db").expect("an address");
-            Influx::new(&target, Secret::new(text).as_ref(), Duration::from_secs(1)).authorization
+            Influx::new(&target, Secret::new(text).as_ref(), Duration::from_secs(1), None).authorization
         };
         assert_eq!(secret("abc").as_deref(), Some("Token abc"));
         assert_eq!(secret("me:abc").as_deref(), Some("Basic bWU6YWJj"));

@@ -32,4 +32,8 @@ pub mod spool;
 #[cfg(feature = "publish")]
 pub mod state;
 #[cfg(feature = "publish")]
+mod stream;
+#[cfg(feature = "publish")]
 pub mod target;
+#[cfg(feature = "publish")]
+pub mod tls;

@@ -6,15 +6,16 @@
 mod packet;
 
 use super::sink::{Record, SendError, Sink, Trouble, io_trouble};
+use super::stream::{self, Stream};
 use super::target::{Secret, Target};
+use super::tls::Trust;
 use crate::bus::host::random_word;
 use crate::bus::time::HostClock;
 use crate::bus::{Mono, Wall};
 use packet::{Connect, Received};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{self, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::io;
 use std::time::Duration;
 
 /// The prefix of topics if the address has no path.
@@ -39,6 +40,7 @@ const FRESH: Duration = Duration::from_secs(10);
 pub struct Mqtt {
     target: Target,
     secret: Option<Secret>,
+    trust: Option<Trust>,
     timeout: Duration,
     clock: HostClock,
     prefix: String,
@@ -49,7 +51,7 @@ pub struct Mqtt {
 
 /// An open connection.
 struct Connection {
-    socket: TcpStream,
+    stream: Box<dyn Stream>,
     clock: HostClock,
     timeout: Duration,
     status_topic: String,
@@ -74,12 +76,13 @@ struct Payload<'a> {
 }
 
 impl Mqtt {
-    /// A broker at this address. `timeout` is the longest wait for an answer.
-    pub fn new(target: &Target, secret: Option<&Secret>, timeout: Duration) -> Mqtt {
+    /// A broker at this address. `timeout` is the longest wait for an answer. With `trust`, the connection uses TLS.
+    pub fn new(target: &Target, secret: Option<&Secret>, timeout: Duration, trust: Option<&Trust>) -> Mqtt {
         let prefix = if target.path.is_empty() { PREFIX.to_owned() } else { target.path.join("/") };
         Mqtt {
             target: target.clone(),
             secret: secret.cloned(),
+            trust: trust.cloned(),
             timeout,
             clock: HostClock::new(),
             prefix,
@@ -94,10 +97,10 @@ impl Mqtt {
         if self.connection.is_none() {
             let bench = self.bench.as_deref().unwrap_or_default();
             let status_topic = format!("{}/{}/status", self.prefix, level(bench));
-            let socket = open(&self.target, self.timeout)?;
             let (clock, timeout) = (self.clock, self.timeout);
+            let stream = stream::open(&self.target, self.trust.as_ref(), timeout, clock)?;
             let mut connection =
-                Connection { socket, clock, timeout, status_topic, last_id: 0, last_sent: clock.now().mono };
+                Connection { stream, clock, timeout, status_topic, last_id: 0, last_sent: clock.now().mono };
             connection.start(&self.client, self.secret.as_ref())?;
             self.connection = Some(connection);
         }
@@ -253,53 +256,18 @@ impl Connection {
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Trouble> {
         self.last_sent = self.clock.now().mono;
-        self.socket.write_all(bytes).map_err(|error| io_trouble(&error))
+        self.stream.set_deadline(self.last_sent + self.timeout);
+        self.stream.write_all(bytes).and_then(|()| self.stream.flush()).map_err(|error| io_trouble(&error))
     }
 
     /// Reads a packet before the time-out.
     fn read(&mut self) -> Result<Received, Trouble> {
-        let end = self.clock.now().mono + self.timeout;
-        let mut input = Deadline { socket: &self.socket, clock: self.clock, end };
-        packet::read(&mut input).map_err(|error| match error.kind() {
+        self.stream.set_deadline(self.clock.now().mono + self.timeout);
+        packet::read(&mut self.stream).map_err(|error| match error.kind() {
             io::ErrorKind::InvalidData => Trouble::Garbage,
             _ => io_trouble(&error),
         })
     }
-}
-
-/// Reads until a deadline, also if the broker sends one byte after the other.
-struct Deadline<'a> {
-    socket: &'a TcpStream,
-    clock: HostClock,
-    end: Mono,
-}
-
-impl Read for Deadline<'_> {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let left = self.end.since(self.clock.now().mono);
-        if left.is_zero() {
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        self.socket.set_read_timeout(Some(left))?;
-        self.socket.read(bytes)
-    }
-}
-
-fn open(target: &Target, timeout: Duration) -> Result<TcpStream, Trouble> {
-    let host = target.host.trim_matches(['[', ']']);
-    let unknown = || Trouble::NoConnection("the host is unknown".to_owned());
-    let addresses = (host, target.port).to_socket_addrs().map_err(|_| unknown())?;
-    let mut trouble = unknown();
-    for address in addresses {
-        match TcpStream::connect_timeout(&address, timeout) {
-            Ok(socket) => {
-                let set = socket.set_write_timeout(Some(timeout)).and_then(|()| socket.set_nodelay(true));
-                return set.map(|()| socket).map_err(|error| io_trouble(&error));
-            }
-            Err(error) => trouble = io_trouble(&error),
-        }
-    }
-    Err(trouble)
 }
 
 /// A level of a topic: without separators and wildcards.
@@ -358,12 +326,13 @@ mod tests {
     use super::*;
     use crate::publish::row::Row;
     use crate::publish::sink::Origin;
+    use std::io::{Read, Write};
     use std::net::TcpListener;
     use std::thread;
 
     fn sink(address: &str) -> Mqtt {
         let target = Target::parse(&format!("mqtt://{address}/lab")).expect("an address");
-        Mqtt::new(&target, Secret::new("me:pass").as_ref(), Duration::from_millis(300))
+        Mqtt::new(&target, Secret::new("me:pass").as_ref(), Duration::from_millis(300), None)
     }
 
     fn encoded(sink: &mut Mqtt, time_us: i64, bench: &str) -> Vec<u8> {

@@ -1,6 +1,7 @@
 //! What a publisher needs from a server: to encode rows, to send them, and to know the answer.
 
 use super::row::Row;
+use super::tls;
 use crate::bus::Wall;
 use std::io;
 use std::time::Duration;
@@ -123,6 +124,36 @@ pub enum Trouble {
     RejectsEverything(String),
     /// The MQTT broker rejects the connection: its return code.
     Refused(u8),
+    /// The certificate of the server is not accepted.
+    Certificate(CertificateFault),
+    /// There is no connection with TLS.
+    Tls(TlsFault),
+}
+
+/// Why a certificate is not accepted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum CertificateFault {
+    /// It is for these names, and not for the host in the address.
+    OtherName(Vec<String>),
+    /// No trusted authority has signed it.
+    UnknownAuthority,
+    /// It is that of an authority (CA:TRUE), and not that of a server.
+    IsAuthority,
+    /// It has expired, at this time if it is known.
+    Expired(Option<Wall>),
+    /// It is not valid yet, until this time if it is known.
+    NotYetValid(Option<Wall>),
+    /// Another fault, in the words of the library.
+    Other(String),
+}
+
+/// Why a connection with TLS fails, except for the certificate.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TlsFault {
+    /// The answer is not TLS.
+    NotTls,
+    /// The server refuses, in the words of the library.
+    Refused(String),
 }
 
 impl Trouble {
@@ -139,6 +170,8 @@ impl Trouble {
             Trouble::Status(..) => "server-error",
             Trouble::RejectsEverything(_) => "rejects-everything",
             Trouble::Refused(_) => "refused",
+            Trouble::Certificate(_) => "certificate",
+            Trouble::Tls(_) => "tls",
         }
     }
 
@@ -155,6 +188,9 @@ impl Trouble {
 
 /// Why a connection failed.
 pub(super) fn io_trouble(error: &io::Error) -> Trouble {
+    if let Some(trouble) = tls::trouble(error) {
+        return trouble;
+    }
     match error.kind() {
         io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => Trouble::Timeout,
         io::ErrorKind::UnexpectedEof

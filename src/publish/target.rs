@@ -1,13 +1,16 @@
 //! The address of a server: `influx://HOST[:8086]/DATABASE`, `influx://HOST[:8086]/ORGANISATION/BUCKET`,
-//! `mqtt://HOST[:1883][/PREFIX]`.
+//! `mqtt://HOST[:1883][/PREFIX]`. With TLS: `influx+https://` (also port 8086) and `mqtts://` (port 8883).
 
 use std::fmt;
 
-/// The port of InfluxDB.
+/// The port of InfluxDB, with and without TLS.
 const INFLUX_PORT: u16 = 8086;
 
 /// The port of MQTT.
 const MQTT_PORT: u16 = 1883;
+
+/// The port of MQTT with TLS.
+const MQTTS_PORT: u16 = 8883;
 
 /// The longest short name, in characters.
 const LONGEST_NAME: usize = 100;
@@ -17,6 +20,8 @@ const LONGEST_NAME: usize = 100;
 pub struct Target {
     /// The kind of the server.
     pub scheme: Scheme,
+    /// Whether the connection uses TLS.
+    pub tls: bool,
     /// The host name or address. An IPv6 address has brackets.
     pub host: String,
     /// The TCP port.
@@ -45,8 +50,6 @@ pub enum TargetError {
     Host,
     /// It names no database.
     Database,
-    /// It needs TLS.
-    Tls,
     /// Its topic contains a wildcard.
     Topic,
     /// It has parts that are not known: a query or a fragment.
@@ -67,10 +70,11 @@ impl Target {
         if rest.contains(['?', '#']) {
             return Err(TargetError::Query);
         }
-        let (scheme, port) = match scheme {
-            "influx" => (Scheme::Influx, INFLUX_PORT),
-            "mqtt" => (Scheme::Mqtt, MQTT_PORT),
-            "influx+https" | "mqtts" => return Err(TargetError::Tls),
+        let (scheme, tls, port) = match scheme {
+            "influx" => (Scheme::Influx, false, INFLUX_PORT),
+            "influx+https" => (Scheme::Influx, true, INFLUX_PORT),
+            "mqtt" => (Scheme::Mqtt, false, MQTT_PORT),
+            "mqtts" => (Scheme::Mqtt, true, MQTTS_PORT),
             _ => return Err(TargetError::Scheme),
         };
         let (host, port) = host_and_port(authority, port).ok_or(TargetError::Host)?;
@@ -80,7 +84,7 @@ impl Target {
             Scheme::Mqtt if path.iter().any(|part| part.contains('+')) => return Err(TargetError::Topic),
             Scheme::Influx | Scheme::Mqtt => {}
         }
-        Ok(Target { scheme, host, port, path })
+        Ok(Target { scheme, tls, host, port, path })
     }
 
     /// A short name for files: `influx-lab1-8086-benches`.
@@ -93,9 +97,11 @@ impl Target {
 
 impl fmt::Display for Target {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let scheme = match self.scheme {
-            Scheme::Influx => "influx",
-            Scheme::Mqtt => "mqtt",
+        let scheme = match (self.scheme, self.tls) {
+            (Scheme::Influx, false) => "influx",
+            (Scheme::Influx, true) => "influx+https",
+            (Scheme::Mqtt, false) => "mqtt",
+            (Scheme::Mqtt, true) => "mqtts",
         };
         write!(f, "{scheme}://{}:{}", self.host, self.port)?;
         self.path.iter().try_for_each(|part| write!(f, "/{part}"))
@@ -178,6 +184,8 @@ mod tests {
             both("influx://[::1]:80/org/a%20b", "influx----1--80-org-a-20b")
         );
         assert_eq!(target("mqtt://broker/a/b"), both("mqtt://broker:1883/a/b", "mqtt-broker-1883-a-b"));
+        assert_eq!(target("influx+https://lab1/db"), both("influx+https://lab1:8086/db", "influx-https-lab1-8086-db"));
+        assert_eq!(target("mqtts://broker"), both("mqtts://broker:8883", "mqtts-broker-8883"));
         for (text, error) in [
             ("lab1", TargetError::Scheme),
             ("http://lab1/db", TargetError::Scheme),
@@ -192,8 +200,6 @@ mod tests {
             ("influx://lab1", TargetError::Database),
             ("influx://lab1/a/b/c", TargetError::Database),
             ("mqtt://lab1/a+", TargetError::Topic),
-            ("influx+https://lab1/db", TargetError::Tls),
-            ("mqtts://lab1", TargetError::Tls),
         ] {
             assert_eq!(target(text), Err(error), "{text}");
         }

@@ -35,6 +35,8 @@ mod plot;
 mod profiles;
 #[cfg(feature = "publish")]
 mod publish;
+#[cfg(feature = "tls")]
+mod publish_tls;
 mod read;
 mod readme;
 mod replay;

@@ -3,16 +3,16 @@
 use super::{Bench, Done};
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpListener};
 use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 
 /// A request: its first line and headers, and its body.
 #[derive(Clone, Debug, Default)]
-struct Request {
-    head: String,
-    body: String,
+pub(super) struct Request {
+    pub(super) head: String,
+    pub(super) body: String,
 }
 
 /// What a server does with a connection.
@@ -25,13 +25,13 @@ struct Server {
     news: mpsc::Receiver<()>,
 }
 
-const OK: &[u8] = b"HTTP/1.1 204 No Content\r\n\r\n";
+pub(super) const OK: &[u8] = b"HTTP/1.1 204 No Content\r\n\r\n";
 
 fn answer(status: &str, headers: &str, body: &str) -> Vec<u8> {
     format!("HTTP/1.1 {status}\r\n{headers}Content-Length: {}\r\n\r\n{body}", body.len()).into_bytes()
 }
 
-fn read_request(reader: &mut BufReader<TcpStream>) -> Option<Request> {
+pub(super) fn read_request(reader: &mut impl BufRead) -> Option<Request> {
     let (mut head, mut length) = (String::new(), 0);
     loop {
         let mut line = String::new();
@@ -110,14 +110,14 @@ impl Server {
 }
 
 /// A bench with a recording of `rows` rows.
-fn recorded(rows: usize) -> Bench {
+pub(super) fn recorded(rows: usize) -> Bench {
     let bench = Bench::of("dps@127");
     bench.run(&format!("log 127 --count {rows} -o run.csv --tag part=P107")).exit(0);
     bench
 }
 
 /// Runs `publish` with short times. Secrets are in the environment.
-fn publish(bench: &Bench, line: &str) -> Done {
+pub(super) fn publish(bench: &Bench, line: &str) -> Done {
     let words: Vec<&str> = line.split_whitespace().collect();
     let mut command = bench.command(&["publish", "--timeout", "1s", "--wait", "1s"]);
     let done = bench.finish(command.args(words).env("CANGAUGE_TOKEN", "s3cret"));
@@ -230,12 +230,18 @@ fn wrong_arguments_change_nothing() {
         ("influx://lab1/db?token=s3cret", "--to must not contain ? or #"),
         ("http://lab1/db", "--to has an unknown kind of server"),
         ("influx://lab1", "--to names no database"),
-        ("influx+https://lab1/db", "--to needs TLS, which this program does not contain"),
         ("influx://lab1:0/db", "--to has no valid host and port"),
     ] {
         let done = publish(&bench, &format!("run.csv --to {url}")).exit(2);
         assert!(done.stderr.starts_with(&format!("cangauge: {message}")), "{url}: {}", done.stderr);
     }
+    #[cfg(not(feature = "tls"))]
+    for url in ["influx+https://lab1/db", "mqtts://lab1"] {
+        let done = publish(&bench, &format!("run.csv --to {url} --ca none.pem")).exit(2);
+        assert!(done.stderr.starts_with("cangauge: --to needs TLS, which this program does not contain\nhint: "));
+    }
+    let done = publish(&bench, "run.csv --to influx://lab1/db --ca none.pem").exit(2);
+    assert!(done.stderr.starts_with("cangauge: --ca needs an address with TLS"), "{}", done.stderr);
     publish(&bench, "run.csv --to influx://127.0.0.1:1/db --tag a=1 --tag a=2").exit(2);
     publish(&bench, "run.csv").exit(2);
     publish(&bench, "none.csv --to influx://127.0.0.1:1/db").exit(8);
@@ -276,7 +282,7 @@ fn service_follows_a_rotated_recording_and_waits_for_the_server() {
 }
 
 /// Reads one MQTT packet: its first byte and its body.
-fn read_packet(stream: &mut TcpStream) -> Option<(u8, Vec<u8>)> {
+pub(super) fn read_packet(stream: &mut impl Read) -> Option<(u8, Vec<u8>)> {
     let mut byte = [0];
     stream.read_exact(&mut byte).ok()?;
     let (first, mut length, mut shift) = (byte[0], 0, 0);
