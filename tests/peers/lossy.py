@@ -117,17 +117,18 @@ class Worker(threading.Thread):
         faults = list(relay.faults_of[self.node])
         self.test.results[name, done.returncode] += 1
         complaints = []
+        flips = [fault[1:] for fault in faults if fault[0] == "flip" and fault[3] and is_data(*fault[1:])]
         if done.returncode and self.test.verbose:
             print(f"{' '.join(operation.words)}: exit {done.returncode} {done.stderr.strip()}", flush=True)
         if done.returncode == 0 and (false := operation.truth(done)):
-            flips = [fault[1:] for fault in faults if fault[0] == "flip" and fault[3]]
-            excuses = [flip for flip in flips if is_data(*flip) and (flip[0] == IN or not operation.is_verified)]
-            if excuses:
+            if any(flip[0] == IN or not operation.is_verified for flip in flips):
                 self.test.results[name, "flipped data"] += 1
             else:
                 complaints.append(f"false: {false}")
         elif done.returncode == 2 and "no valid answer" in done.stderr:
             pass  # Without the device type (1000h), the types of the signals are unknown. The note names 1000h.
+        elif done.returncode == 2 and any(flip[0] == IN for flip in flips):
+            self.test.results[name, "other device"] += 1  # With another device type or mapping, it looks like another device.
         elif done.returncode not in FAILURES | {0} or "panicked" in done.stderr:
             complaints.append("not a failure of the wire")
         # A delayed frame would disturb the next command.
