@@ -13,8 +13,9 @@ use crate::tasks::{Failure, Kind, config};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-/// Check a device against CiA 301 and CiA 305
+/// Check a device against CiA 301, CiA 305 and its EDS
 ///
 /// The command runs a list of cases. Each case sends requests, right ones and wrong ones, and compares the answers with
 /// the standard. It prints a verdict for each case: pass, deviates, not-judged or not-applicable. A deviation that the
@@ -25,6 +26,9 @@ use std::path::{Path, PathBuf};
 /// settings and the NMT state are as before. With --store, settings are also stored and restored for a while, and LSS
 /// sets the present node-ID; afterwards the present settings are stored.
 ///
+/// With --eds FILE, the EDS or DCF file is also checked against CiA 306 and compared with the device: existence, size,
+/// access, limits and mapping of each object, and with --store its defaults.
+///
 /// Some cases reset the device. Without --store, settings in 2000h to 5FFFh that were not stored are then lost. They are
 /// listed as "not restored" if the object dictionary of the device is known.
 ///
@@ -33,7 +37,7 @@ use std::path::{Path, PathBuf};
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n  timing         timing profile: figures without a verdict\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
+    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n  eds            EDS file (--eds)\n  timing         timing profile: figures without a verdict\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform 5 --eds sensor.eds --report new.html\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
 )]
 pub(crate) struct Conform {
     #[command(subcommand)]
@@ -145,7 +149,8 @@ impl Conform {
     }
 
     fn check(&self, global: &Global, node: NodeId) -> anyhow::Result<()> {
-        let options = ConformOptions { only: self.only, skip: self.skip.clone(), store: self.store };
+        let eds = descriptions::file_of(global, node)?.map(Arc::new);
+        let options = ConformOptions { only: self.only, skip: self.skip.clone(), store: self.store, eds };
         if self.dry_run {
             return global.print(&options.selected().map(CaseRow).collect::<Vec<_>>());
         }

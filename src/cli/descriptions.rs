@@ -236,6 +236,18 @@ pub(super) fn eds(name: &str, global: &Global) -> anyhow::Result<eds::Eds> {
     Ok(eds_of(name, &read_file(name)?, global)?)
 }
 
+/// The EDS or DCF file that the user named for a node, without printing its warnings.
+///
+/// # Errors
+/// The file cannot be read, or is no EDS file.
+pub(super) fn file_of(global: &Global, node: NodeId) -> anyhow::Result<Option<eds::Eds>> {
+    let fitting = global.eds.iter().filter(|given| given.node.is_none_or(|of| of == node));
+    let Some(given) = fitting.max_by_key(|given| given.node.is_some()) else { return Ok(None) };
+    let name = &given.what;
+    let eds = eds::read(&read_file(name)?).map_err(|error| ErrorMessage::usage(format!("{name}: {error}")))?;
+    Ok(Some(eds))
+}
+
 fn eds_of(name: &str, bytes: &[u8], global: &Global) -> Result<eds::Eds, ErrorMessage> {
     let eds = eds::read(bytes).map_err(|error| ErrorMessage::usage(format!("{name}: {error}")))?;
     print_warnings(name, &eds.warnings, global);

@@ -12,7 +12,7 @@ fn known_deviations_are_named_with_their_page_and_are_no_failure() {
         done.stdout
     );
     assert!(done.stdout.starts_with("SDO-01  pass            A read of 1000h"), "{}", done.stdout);
-    assert!(done.stderr.contains("node 1: 125 cases in"), "{}", done.stderr);
+    assert!(done.stderr.contains("node 1: 142 cases in"), "{}", done.stderr);
 }
 
 #[test]
@@ -54,6 +54,41 @@ fn dry_run_lists_the_cases_and_uses_no_bus() {
     bench.run("conform 1 --skip SDO-99").exit(2);
     bench.run("conform 1,2").exit(2);
     bench.run("conform 1 --only everything").exit(2);
+}
+
+/// An EDS file of three objects. The type of 1017h is wrong, and the device has no 6200h.
+const EDS: &str = "[DeviceInfo]\nVendorNumber=71\n\n[MandatoryObjects]\nSupportedObjects=2\n1=0x1000\n2=0x1001\n\n\
+    [OptionalObjects]\nSupportedObjects=2\n1=0x1017\n2=0x6200\n\n\
+    [1000]\nParameterName=Device type\nObjectType=7\nDataType=7\nAccessType=ro\nPDOMapping=0\n\n\
+    [1001]\nParameterName=Error register\nObjectType=7\nDataType=5\nAccessType=ro\nPDOMapping=0\n\n\
+    [1017]\nParameterName=Heartbeat\nObjectType=7\nDataType=5\nAccessType=rw\nPDOMapping=0\n\n\
+    [6200]\nParameterName=Output\nObjectType=7\nDataType=5\nAccessType=rw\nPDOMapping=0\n";
+
+#[test]
+fn eds_file_is_compared_with_the_device() {
+    let bench = Bench::of("mh4@1");
+    let path = bench.path("sensor.eds");
+    std::fs::write(&path, EDS).expect("the file");
+    let eds = path.display();
+    let done = bench.run(&format!("conform 1 --only eds --eds {eds}")).exit(1);
+    for line in [
+        "EDS-01  pass            The file follows CiA 306\n",
+        "        0x1018:0: expected the object in the EDS file; seen: no such object in the file\n",
+        "        0x1017:0: expected the data type u16 in the EDS file; seen: u8\n",
+        "        0x6200:0: expected the object of the EDS file; seen: abort 0x06020000, the object does not exist\n",
+        "        0x1017:0: expected 1 byte; seen: 581#4B17100000000000\n",
+        "EDS-13  pass            Objects that the file calls ro or const reject a write of their present value\n",
+        "EDS-18  not-applicable  After a restore and a reset, the settings have the defaults of the file\n",
+    ] {
+        assert!(done.stdout.contains(line), "{line}{}", done.stdout);
+    }
+    // Another device: nothing is written.
+    std::fs::write(&path, EDS.replace("VendorNumber=71", "VendorNumber=72")).expect("the file");
+    bench.run(&format!("conform 1 --only eds --eds {eds}")).exit(2);
+    let done = bench.run(&format!("conform 1 --only eds --eds {eds} --accept-mismatch")).exit(1);
+    assert!(done.stdout.contains("        0x1018:1: expected 72 (0x48); seen: 71\n"), "{}", done.stdout);
+    let done = bench.run("conform 1 --only eds").exit(0);
+    assert!(done.stdout.contains("EDS-01  not-applicable  The file follows CiA 306\n        not run without --eds\n"));
 }
 
 #[test]

@@ -1,5 +1,8 @@
 //! Benches on which all is well: `doctor` finds nothing, and `conform` no deviation.
 
+#[path = "../scenarios/conform/eds_text.rs"]
+mod eds_text;
+
 use crate::bench::{bench, identity};
 use crate::env_number;
 use crate::kinds::LARGE_KIND;
@@ -7,6 +10,7 @@ use crate::random::Random;
 use crate::spec::{Act, DeviceSpec, Other, Spec};
 use cangauge::bus::Bus;
 use cangauge::bus::coded::Coded;
+use cangauge::device::{catalog, eds};
 use cangauge::master::{Master, Timing};
 use cangauge::node::Overrides;
 use cangauge::sim::Recorder;
@@ -14,6 +18,7 @@ use cangauge::tasks::Failure;
 use cangauge::tasks::config::{Journal, Snapshot};
 use cangauge::tasks::conform::{ConformOptions, conform};
 use cangauge::tasks::doctor::{DoctorOptions, examine};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// The number of benches of a plain `cargo test`; others: `ENGINE_HEALTHY=1000`.
@@ -114,7 +119,9 @@ fn conform_finds_no_deviation_on_a_device_without_a_fault() {
         let until = bus.mono() + Duration::from_millis(20);
         while matches!(bus.receive(until), Ok(cangauge::bus::Event::Frame(_))) {}
         let node = crate::carry_out::node(spec.devices[0].node.expect("a node-ID"));
-        let options = ConformOptions { store: seed % 2 == 0, ..ConformOptions::default() };
+        let model = catalog::by_name(spec.devices[0].kind).expect("built in");
+        let file = eds::read(eds_text::eds_text(&model).as_bytes()).expect("an EDS file");
+        let options = ConformOptions { store: seed % 2 == 0, eds: Some(Arc::new(file)), ..ConformOptions::default() };
         let mut master = Master::new(&mut bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
         let result = conform(&mut master, node, &Overrides::new(), &options, &mut NoJournal, &mut |_| {});
         match result {

@@ -94,7 +94,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Drops limits that allow no value, or only 0, for a writable object: they must be a mistake.
+    /// Drops limits that allow no value, or only 0, for a writable object: they must be a mistake. Only 0 may be written
+    /// to the error count 1003h:0.
     fn limits(
         &mut self,
         section: &Section,
@@ -108,7 +109,9 @@ impl Reader<'_> {
         };
         let what = match (number(&low), number(&high)) {
             (Some(low), Some(high)) if low > high => "LowLimit is above HighLimit",
-            (Some(0.0), Some(0.0)) if access.is_writable() => "LowLimit and HighLimit are 0",
+            (Some(0.0), Some(0.0)) if access.is_writable() && !section.name.starts_with("1003") => {
+                "LowLimit and HighLimit are 0"
+            }
             _ => return [low, high],
         };
         self.warn(section.line, format!("[{}] {what}; ignored", section.shown));

@@ -1,6 +1,7 @@
 //! The words for findings.
 
 use crate::bus::time::format_duration;
+use crate::device::scalar::Scalar;
 use crate::output::failure::ErrorMessage;
 use crate::output::text::spaced_bytes;
 use crate::tasks::conform::{Expected, Figure, Finding, Seen, Statistic, WhyNot};
@@ -73,6 +74,7 @@ fn expected(expected: &Expected) -> String {
         Expected::OtherBytes(bytes) => format!("other bytes than {}", spaced_bytes(bytes)),
         Expected::OtherCanId => "another CAN-ID".to_owned(),
         Expected::ZeroPadding => "zeros in the unused bytes".to_owned(),
+        Expected::Size(1) => "1 byte".to_owned(),
         Expected::Size(size) => format!("{size} bytes"),
         Expected::Crc(crc) => format!("CRC 0x{crc:04X}"),
         Expected::Refused => "an abort or an error code".to_owned(),
@@ -93,7 +95,23 @@ fn expected(expected: &Expected) -> String {
         Expected::AlternatingToggle => "the state, with a toggle bit that alternates".to_owned(),
         Expected::FirstToggle => "the state, with the toggle bit 0".to_owned(),
         Expected::LifeGuardingEvent => "emergency 8130h, or pre-operational".to_owned(),
+        Expected::Cia306 => "a file as in CiA 306".to_owned(),
+        Expected::InFile => "the object in the EDS file".to_owned(),
+        Expected::Exists => "the object of the EDS file".to_owned(),
+        Expected::Type(data_type) => format!("the data type {data_type} in the EDS file"),
+        Expected::Limits(low, high) => limits(low.as_ref(), high.as_ref()),
+        Expected::Mapped => "an accepted mapping".to_owned(),
         Expected::GenericErrorBit => "bit 0 set".to_owned(),
+    }
+}
+
+/// The limits of the file for a default.
+fn limits(low: Option<&Scalar>, high: Option<&Scalar>) -> String {
+    match (low, high) {
+        (Some(low), Some(high)) => format!("a default of {low} to {high}"),
+        (Some(low), None) => format!("a default of {low} or more"),
+        (None, Some(high)) => format!("a default of at most {high}"),
+        (None, None) => "a default".to_owned(),
     }
 }
 
@@ -110,6 +128,11 @@ fn seen(seen: &Seen) -> String {
         Seen::Frames(count) => format!("{count} frames"),
         Seen::Period(period) => duration(*period),
         Seen::Crc(crc) => format!("CRC 0x{crc:04X}"),
+        Seen::Line(line, text) => format!("line {line}: {text}"),
+        Seen::NotInFile => "no such object in the file".to_owned(),
+        Seen::Type(data_type) => data_type.to_string(),
+        Seen::Value(value) => format!("a default of {value}"),
+        Seen::Acknowledged => "it was accepted".to_owned(),
         Seen::After(time) => format!("a frame after {}", duration(*time)),
     }
 }
@@ -133,6 +156,7 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::NoError => "the device has no error, and a SYNC of eight bytes causes none".to_owned(),
         WhyNot::NoLss => "the device does not answer LSS".to_owned(),
         WhyNot::NoService(service) => format!("the device does not answer LSS service {service:02X}h"),
+        WhyNot::NoEds => "not run without --eds".to_owned(),
         WhyNot::NeedsStore => "not run without --store".to_owned(),
         WhyNot::NoRemoteFrames => "this bus carries no remote frames".to_owned(),
         WhyNot::NotAlone => "not run, because other nodes are on the bus".to_owned(),

@@ -25,13 +25,15 @@ pub enum Area {
     Store,
     /// LSS services.
     Lss,
+    /// The EDS file of the device.
+    Eds,
     /// Answer times, jitter, boot-up times: figures without a verdict.
     Timing,
 }
 
 impl Area {
     /// All areas, in the order in which they run.
-    pub const ALL: [Area; 9] = [
+    pub const ALL: [Area; 10] = [
         Area::Sdo,
         Area::Od,
         Area::Nmt,
@@ -40,6 +42,7 @@ impl Area {
         Area::Emcy,
         Area::Store,
         Area::Lss,
+        Area::Eds,
         Area::Timing,
     ];
 
@@ -54,6 +57,7 @@ impl Area {
             Area::Emcy => "emcy",
             Area::Store => "store",
             Area::Lss => "lss",
+            Area::Eds => "eds",
             Area::Timing => "timing",
         }
     }
@@ -69,6 +73,7 @@ impl Area {
             Area::Emcy => "emergencies and error history",
             Area::Store => "store and restore",
             Area::Lss => "LSS services",
+            Area::Eds => "EDS file (--eds)",
             Area::Timing => "timing profile: figures without a verdict",
         }
     }
@@ -76,7 +81,14 @@ impl Area {
     /// Whether the frames of the area are addressed to the node alone. Other nodes are then not affected.
     pub fn is_local(self) -> bool {
         match self {
-            Area::Sdo | Area::Od | Area::Nmt | Area::ErrorControl | Area::Emcy | Area::Store | Area::Timing => true,
+            Area::Sdo
+            | Area::Od
+            | Area::Nmt
+            | Area::ErrorControl
+            | Area::Emcy
+            | Area::Store
+            | Area::Eds
+            | Area::Timing => true,
             Area::Pdo | Area::Lss => false,
         }
     }

@@ -5,6 +5,8 @@ use crate::canopen::frame::Frame;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
+use crate::canopen::value::DataType;
+use crate::device::scalar::Scalar;
 use crate::tasks::Failure;
 use std::time::Duration;
 
@@ -101,6 +103,18 @@ pub enum Expected {
     LifeGuardingEvent,
     /// Bit 0 is set if another bit is set.
     GenericErrorBit,
+    /// A file that follows CiA 306.
+    Cia306,
+    /// The object is in the file.
+    InFile,
+    /// The object exists in the device.
+    Exists,
+    /// This data type in the file.
+    Type(DataType),
+    /// A default between these limits of the file.
+    Limits(Option<Scalar>, Option<Scalar>),
+    /// An accepted mapping of the object.
+    Mapped,
 }
 
 /// What was seen.
@@ -126,6 +140,16 @@ pub enum Seen {
     Crc(u16),
     /// A first frame after this time.
     After(Duration),
+    /// A line of the file, counted from 1, and what is wrong.
+    Line(usize, String),
+    /// The object is not in the file.
+    NotInFile,
+    /// This data type in the file.
+    Type(DataType),
+    /// This value in the file.
+    Value(Scalar),
+    /// The device accepted it.
+    Acknowledged,
 }
 
 /// Why a case has no verdict.
@@ -163,6 +187,8 @@ pub enum WhyNot {
     NoLss,
     /// The device does not answer this LSS service.
     NoService(u8),
+    /// There is no EDS file.
+    NoEds,
     /// The case needs `--store`.
     NeedsStore,
     /// The bus carries no remote frames.

@@ -6,6 +6,7 @@
 mod alone;
 mod case;
 mod codes;
+mod eds;
 mod emcy;
 mod error_control;
 mod failure;
@@ -31,6 +32,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::device::description::Deviation;
+use crate::device::eds::Eds;
 use crate::master::Master;
 pub use crate::master::{Exchanged, Transcript};
 use crate::node::{Error, Node, Overrides, state};
@@ -39,13 +41,14 @@ use crate::tasks::settings::open;
 use crate::tasks::{Failure, Kind};
 use session::Session;
 use settings::Settings;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// All cases, in the order in which they run.
 pub fn cases() -> impl Iterator<Item = &'static Case> {
     let sdo = [sdo::CASES, sdo::segments::CASES, sdo::general::CASES, sdo::blocks::CASES];
     let others = [od::CASES, nmt::CASES, error_control::CASES, pdo::CASES, pdo::mapping::CASES, pdo::locks::CASES];
-    sdo.into_iter().chain(others).chain([emcy::CASES, store::CASES, lss::CASES, timing::CASES]).flatten()
+    sdo.into_iter().chain(others).chain([emcy::CASES, store::CASES, lss::CASES, eds::CASES, timing::CASES]).flatten()
 }
 
 /// What to check.
@@ -57,6 +60,8 @@ pub struct ConformOptions {
     pub skip: Vec<String>,
     /// Also run the cases that store settings, set the node-ID, or write a signature.
     pub store: bool,
+    /// The EDS file that is compared with the device.
+    pub eds: Option<Arc<Eds>>,
 }
 
 impl ConformOptions {
@@ -148,6 +153,7 @@ pub fn conform(
     let mut session = Session {
         master,
         node,
+        eds: options.eds.clone(),
         is_alone,
         settings: Settings::default(),
         initial_state: None,

@@ -95,7 +95,7 @@ fn vendor(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 }
 
 /// Objects whose sub-index 0 is not the highest sub-index, but a number of valid entries.
-fn counts_entries(index: u16) -> bool {
+pub(super) fn counts_entries(index: u16) -> bool {
     index == 0x1003 || (0x1600..=0x17ff).contains(&index) || (0x1a00..=0x1bff).contains(&index)
 }
 
@@ -131,14 +131,14 @@ fn highest_sub_index(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 }
 
 /// The answer to a read of an entry.
-fn entry(session: &mut Session<'_, '_>, object: ObjectId) -> Result<Option<Frame>, Error> {
+pub(super) fn entry(session: &mut Session<'_, '_>, object: ObjectId) -> Result<Option<Frame>, Error> {
     let answer = session.upload(object)?;
     session.end_transfer_of(answer.as_ref())?;
     Ok(answer)
 }
 
 /// Whether an entry exists: the device answers, or rejects a read because the entry is write-only.
-fn exists(answer: Option<&Frame>) -> bool {
+pub(super) fn exists(answer: Option<&Frame>) -> bool {
     let code = answer.and_then(abort_code);
     answer.is_some() && code.is_none_or(|code| codes::WRITE_ONLY[..2].contains(&code.0))
 }

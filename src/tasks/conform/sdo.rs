@@ -162,7 +162,11 @@ pub(super) fn narrow_setting(session: &mut Session<'_, '_>) -> Result<Option<(Ob
 }
 
 /// Whether the object has another value than before the case.
-fn unchanged(session: &mut Session<'_, '_>, object: ObjectId, value: &[u8]) -> Result<Option<Finding>, Error> {
+pub(super) fn unchanged(
+    session: &mut Session<'_, '_>,
+    object: ObjectId,
+    value: &[u8],
+) -> Result<Option<Finding>, Error> {
     let found = session.read(object)?.unwrap_or_default();
     Ok((found != value).then(|| Finding::at(object, Expected::Bytes(value.to_vec()), Seen::Bytes(found))))
 }
@@ -196,7 +200,7 @@ struct Limited {
 }
 
 /// Whether the rules for PDOs decide which values of an object are allowed.
-fn has_pdo_rules(object: ObjectId) -> bool {
+pub(super) fn has_pdo_rules(object: ObjectId) -> bool {
     match object.index {
         0x1005 | 0x1014 | 0x1a00..=0x1bff => true,
         0x1800..=0x19ff => object.sub == 1,

@@ -8,11 +8,13 @@ use crate::canopen::nmt::{Life, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::device::description::SizeIndication;
+use crate::device::eds::Eds;
 use crate::master::{Happening, Master, Request, SdoFailure};
 use crate::node::state::{BOOT_TIMEOUT, HEARTBEAT_TIME};
 use crate::node::wait::{Policy, wait};
 use crate::node::{Error, Node};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// The heartbeat time while states are observed.
@@ -28,6 +30,8 @@ pub(super) const SETTLE: Duration = Duration::from_millis(20);
 pub(super) struct Session<'s, 'bus> {
     pub(super) master: &'s mut Master<'bus>,
     pub(super) node: Node,
+    /// The EDS file that is compared with the device.
+    pub(super) eds: Option<Arc<Eds>>,
     /// Whether no other node is on the bus.
     pub(super) is_alone: bool,
     /// The settings before the first case.

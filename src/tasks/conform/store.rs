@@ -41,8 +41,8 @@ pub(super) const CASES: &[Case] = &[
         .stores(),
 ];
 
-const STORE_ALL: ObjectId = ObjectId::new(0x1010, 1);
-const RESTORE_ALL: ObjectId = ObjectId::new(0x1011, 1);
+pub(super) const STORE_ALL: ObjectId = ObjectId::new(0x1010, 1);
+pub(super) const RESTORE_ALL: ObjectId = ObjectId::new(0x1011, 1);
 
 /// The value of each sub-index of 1010h or 1011h.
 fn bits(session: &mut Session<'_, '_>, index: u16, reserved: u64) -> Result<Verdict, Error> {
@@ -78,7 +78,7 @@ fn group(session: &mut Session<'_, '_>, all: ObjectId) -> Result<Option<ObjectId
 
 impl Session<'_, '_> {
     /// Writes a signature to 1010h or 1011h. `false` if the device rejects it.
-    fn sign(&mut self, object: ObjectId, signature: &[u8; 4]) -> Result<bool, Error> {
+    pub(super) fn sign(&mut self, object: ObjectId, signature: &[u8; 4]) -> Result<bool, Error> {
         let mut unused = (|_| {}, |_: &crate::bus::Received| {});
         let mut options = WriteOptions::new(&mut unused.0, &mut unused.1);
         options.min_timeout = STORE_TIMEOUT;

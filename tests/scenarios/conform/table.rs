@@ -11,7 +11,7 @@ use std::time::Duration;
 pub(super) type Row = (&'static str, &'static str, Deviation);
 
 /// The answer to a request with the same object.
-fn reply(command: u8, request: [u8; 8], data: [u8; 4]) -> [u8; 8] {
+pub(super) fn reply(command: u8, request: [u8; 8], data: [u8; 4]) -> [u8; 8] {
     let [_, a, b, c, ..] = request;
     let [d, e, f, g] = data;
     [command, a, b, c, d, e, f, g]

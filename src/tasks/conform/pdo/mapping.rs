@@ -34,8 +34,8 @@ pub(in super::super) const CASES: &[Case] = &[
 ];
 
 /// A TPDO with its mapping. The mapping is open for changes.
-struct Open {
-    tpdo: Tpdo,
+pub(in super::super) struct Open {
+    pub(in super::super) tpdo: Tpdo,
     entries: Vec<u32>,
 }
 
@@ -50,7 +50,7 @@ fn mapping(session: &mut Session<'_, '_>, tpdo: Tpdo) -> Result<Vec<u32>, Error>
 }
 
 /// Switches a TPDO off and sets its number of entries to 0. `None` if the mapping is fixed.
-fn open(session: &mut Session<'_, '_>) -> Result<Result<Open, Verdict>, Error> {
+pub(in super::super) fn open(session: &mut Session<'_, '_>) -> Result<Result<Open, Verdict>, Error> {
     let Some(tpdo) = prepare(session)? else { return Ok(Err(NO_TPDO)) };
     let entries = mapping(session, tpdo)?;
     session.touch_mapping(tpdo.mapping(0))?;
