@@ -5,6 +5,7 @@
 
 mod asc;
 mod candump;
+mod channel;
 mod date;
 mod error;
 mod format;
@@ -19,14 +20,14 @@ mod wanted;
 use super::memory::Sleeper;
 use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
+use channel::{Channel, MAX_CHANNELS};
 pub use error::RecordingError;
 pub use format::{FileFormat, RecordingFormat};
 use lines::Lines;
-use std::borrow::Cow;
 use std::io;
 use std::mem;
 use std::time::{Duration, Instant};
-use text::FrameOrFault;
+use text::{FrameOrFault, text_of};
 use wanted::Wanted;
 
 /// A file is not a recording after this many lines of unknown format.
@@ -34,9 +35,6 @@ const MAX_UNKNOWN: u64 = 100;
 
 /// The number of lines read ahead to check whether times without a date increase.
 const LINES_AHEAD: usize = 1000;
-
-/// The number of channels listed in messages.
-const MAX_CHANNELS: usize = 16;
 
 /// Times before this moment (March 1973) have no date: they count from the start of the recording.
 const FIRST_DATE: Duration = Duration::from_secs(100_000_000);
@@ -120,7 +118,7 @@ pub struct Replay {
     /// The channel to replay; the only one if none is chosen.
     channel: Option<String>,
     /// The channels of the frames so far.
-    channels: Vec<String>,
+    channels: Vec<Channel>,
     /// The time of the last line that was read.
     last: Option<Stamp>,
     /// The time before the last step backwards, and the size of that step.
@@ -258,6 +256,9 @@ impl Replay {
         let mut bytes = mem::take(&mut self.buffer);
         let mut result = Ok(());
         while result.is_ok() && self.next.is_none() && self.state == State::Reading {
+            if self.read_fixed() {
+                continue;
+            }
             result = match self.lines.next(&mut bytes) {
                 Ok(Some(number)) => self.read(number, &bytes),
                 Ok(None) => self.end(),
@@ -268,12 +269,16 @@ impl Replay {
         result
     }
 
+    /// Reads the next line in the read buffer if it has the fixed form of candump, and its channel is known.
+    fn read_fixed(&mut self) -> bool {
+        let Some((RecordingFormat::Candump, _)) = self.format else { return false };
+        let Some(line) = candump::fixed_line(self.lines.buffered(), &self.channels) else { return false };
+        let number = self.lines.skip(line.length);
+        self.deliver(number, line.wall, self.channels[line.channel].is_wanted, Ok(line.frame));
+        true
+    }
+
     fn read(&mut self, number: u64, bytes: &[u8]) -> Result<(), BusError> {
-        if let (Some((RecordingFormat::Candump, _)), Some((wall, channel, frame))) =
-            (&self.format, candump::fixed_line(bytes))
-        {
-            return self.take(number, wall, channel, Ok(frame));
-        }
         let text = text_of(bytes);
         let text = text.trim();
         let is_cut = self.lines.is_cut;
@@ -330,24 +335,29 @@ impl Replay {
                 self.has_no_date = true;
             }
         }
-        if self.channels.last().is_none_or(|last| last != channel) && !self.channels.iter().any(|it| it == channel) {
+        let is_wanted = self.channel.as_deref().is_none_or(|chosen| chosen == channel);
+        if !self.channels.iter().any(|known| known.name == channel) {
             if let (None, Some(first)) = (&self.channel, self.channels.first()) {
-                let error = RecordingError::SeveralChannels(first.clone(), channel.to_owned());
+                let error = RecordingError::SeveralChannels(first.name.clone(), channel.to_owned());
                 return Err(self.wrong(Some(number), error));
             }
             if self.channels.len() < MAX_CHANNELS {
-                self.channels.push(channel.to_owned());
+                self.channels.push(Channel { name: channel.to_owned(), is_wanted });
             }
         }
+        self.deliver(number, wall, is_wanted, event);
+        Ok(())
+    }
+
+    /// Makes an event the next one, unless its channel or its frame is not wanted.
+    fn deliver(&mut self, number: u64, wall: Wall, is_wanted: bool, event: FrameOrFault) {
         let at = self.place(number, wall);
-        let is_wanted = self.channel.as_deref().is_none_or(|chosen| chosen == channel);
         self.next = match event {
             _ if !is_wanted => None,
             Ok(frame) if !self.wanted.has(frame.id()) => None,
             Ok(frame) => Some((at, Event::Frame(Received { frame, at }))),
             Err(fault) => Some((at, Event::Fault(fault, at))),
         };
-        Ok(())
     }
 
     /// Reads further lines of a candump log whose times have no date. If at least one of ten times is not later than
@@ -384,8 +394,9 @@ impl Replay {
             self.cut_off = Some(self.lines.count() + 1);
         }
         match &self.channel {
-            Some(chosen) if !self.channels.contains(chosen) => {
-                let channels = self.channels.iter().filter(|name| !name.is_empty()).cloned().collect();
+            Some(chosen) if !self.channels.iter().any(|channel| channel.name == *chosen) => {
+                let names = self.channels.iter().map(|channel| channel.name.clone());
+                let channels = names.filter(|name| !name.is_empty()).collect();
                 Err(self.wrong(None, RecordingError::NoChannel { chosen: chosen.clone(), channels }))
             }
             _ => Ok(()),
@@ -402,20 +413,6 @@ impl Replay {
             None => self.wrong(None, RecordingError::UnknownFormat),
         }
     }
-}
-
-/// A line as text, without the escape sequences of `candump -c`.
-fn text_of(bytes: &[u8]) -> Cow<'_, str> {
-    let text = String::from_utf8_lossy(bytes);
-    if !text.contains('\x1b') {
-        return text;
-    }
-    let mut parts = text.split('\x1b');
-    let mut plain = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        plain.push_str(part.split_once('m').map_or(part, |(_, rest)| rest));
-    }
-    Cow::Owned(plain)
 }
 
 impl Drop for Replay {
@@ -441,7 +438,8 @@ impl BitRateControl for Replay {}
 
 impl Bus for Replay {
     fn name(&self) -> &str {
-        self.channel.as_ref().or(self.channels.first()).filter(|name| !name.is_empty()).unwrap_or(&self.file)
+        let first = self.channels.first().map(|channel| &channel.name);
+        self.channel.as_ref().or(first).filter(|name| !name.is_empty()).unwrap_or(&self.file)
     }
 
     fn timestamps(&self) -> TimestampSource {

@@ -154,6 +154,11 @@ impl CanId {
         NodeId::of(self, 0x080)
     }
 
+    /// Whether this is one of the predefined identifiers of PDOs, 180h to 57Fh.
+    pub fn is_predefined_pdo(self) -> bool {
+        matches!(self, CanId::Standard(0x180..=0x57f))
+    }
+
     /// Whether CiA 301, 7.3.5 forbids this identifier for PDOs, SYNC and EMCY.
     pub fn is_restricted(self) -> bool {
         match self {

@@ -97,6 +97,11 @@ impl MissedAnswers {
         !self.repeated.is_empty()
     }
 
+    /// Whether a request has no answer so far.
+    pub(super) fn has_open(&self) -> bool {
+        !self.open.is_empty()
+    }
+
     /// A node answered.
     pub(super) fn on_answer(&mut self, node: NodeId) {
         self.answered.insert(node);

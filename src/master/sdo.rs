@@ -211,6 +211,10 @@ impl SdoClient {
     /// Handles a received frame; `false` if it does not belong to one of our transfers.
     pub(super) fn on_frame(&mut self, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let id = received.frame.id();
+        // Most frames of a bus are PDOs. They can only be answers with a wrong COB-ID.
+        if id.is_predefined_pdo() && !self.missed_answers.has_open() {
+            return false;
+        }
         self.receive_times.on_frame(received);
         let known = id.sdo_response_node().or_else(|| id.sdo_request_node());
         let Some(number) = known.filter(|node| self.nodes.contains_key(node)) else {

@@ -318,6 +318,11 @@ impl Decoder {
         self.tpdos.keys().copied()
     }
 
+    /// Whether the TPDO with this COB-ID is known.
+    pub fn decodes(&self, id: CanId) -> bool {
+        self.tpdos.contains_key(&id)
+    }
+
     /// The number of values that are decoded from the TPDO with this COB-ID.
     pub fn values_of(&self, id: CanId) -> u64 {
         self.tpdos.get(&id).map_or(0, |tpdo| tpdo.values.len() as u64)

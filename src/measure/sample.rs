@@ -23,6 +23,16 @@ pub enum Number {
     Real64(f64),
 }
 
+/// 10⁰ to 10²², which are exact.
+const POWERS_OF_TEN: [f64; 23] = {
+    let (mut powers, mut at) = ([1.0; 23], 1);
+    while at < powers.len() {
+        powers[at] = powers[at - 1] * 10.0;
+        at += 1;
+    }
+    powers
+};
+
 impl Number {
     /// The number of a decoded value. Integers get the device's decimal digits. Text and bytes are not numbers.
     pub fn from_value(value: &Value, digits: u8) -> Option<Number> {
@@ -58,10 +68,12 @@ impl Number {
         match self {
             // Up to 2^53 and 22 digits both numbers are exact, so their quotient is the nearest one. Otherwise the text
             // is parsed.
-            Number::Decimal { mantissa, digits } if digits <= 22 && mantissa.unsigned_abs() < 1 << 53 => {
-                mantissa as f64 / 10f64.powi(i32::from(digits))
+            Number::Decimal { mantissa, digits } => {
+                match (i64::try_from(mantissa), POWERS_OF_TEN.get(usize::from(digits))) {
+                    (Ok(mantissa), Some(power)) if mantissa.unsigned_abs() < 1 << 53 => mantissa as f64 / power,
+                    _ => self.to_string().parse().unwrap_or(f64::NAN),
+                }
             }
-            Number::Decimal { .. } => self.to_string().parse().unwrap_or(f64::NAN),
             Number::Real32(number) => f64::from(number),
             Number::Real64(number) => number,
         }

@@ -308,6 +308,9 @@ impl<'a> Checker<'a> {
     }
 
     fn evaluate(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        if self.evaluator.expressions().is_empty() {
+            return ControlFlow::Continue(());
+        }
         let before = self.received.len();
         if !self.is_bound {
             self.received.extend(samples.iter().map(|sample| sample.source));

@@ -5,14 +5,11 @@
 //! has no times.
 
 use super::text::{ERROR_FRAME, FrameOrFault, TimeZone, digits, fault, number};
-use super::{Line, Parser};
+use super::{Channel, Line, Parser};
 use crate::bus::Wall;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use std::time::Duration;
-
-/// More digits of the seconds are left to the parser, which checks the year.
-const MAX_SECONDS_DIGITS: usize = 10;
 
 pub(super) struct Candump {
     zone: TimeZone,
@@ -37,49 +34,65 @@ impl Parser for Candump {
     }
 }
 
-/// A line as `candump -L` writes it, `(1436509053.249713) can0 123#1122`, with a data frame with an 11-bit identifier.
-/// `None` for every other line: the parser reads it. Most recordings have millions of such lines.
-pub(super) fn fixed_line(line: &[u8]) -> Option<(Wall, &str, Frame)> {
-    let line = line.strip_prefix(b"(")?.strip_suffix(b"\n")?;
-    let (seconds, line) = split_at_byte(line, b'.')?;
-    let (micros, line) = line.split_first_chunk::<6>()?;
-    let (channel, frame) = split_at_byte(line.strip_prefix(b") ")?, b' ')?;
-    let (id, data) = split_at_byte(frame, b'#')?;
-    let ([_, _, _], 0..=MAX_SECONDS_DIGITS, 0..=16) = (id, seconds.len(), data.len()) else { return None };
-    let id = id.iter().try_fold(0u16, |id, &digit| Some(id << 4 | u16::from(hex_digit(digit)?)))?;
-    let mut bytes = [0; 8];
-    let (pairs, []) = data.as_chunks::<2>() else { return None };
-    for (byte, &[high, low]) in bytes.iter_mut().zip(pairs) {
-        *byte = hex_digit(high)? << 4 | hex_digit(low)?;
+/// A line in the fixed form.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct FixedLine {
+    pub(super) wall: Wall,
+    /// The position of its channel in the list of known channels.
+    pub(super) channel: usize,
+    pub(super) frame: Frame,
+    /// The number of bytes, with the line end.
+    pub(super) length: usize,
+}
+
+/// Reads the line at the start of `bytes` if it has the fixed form of `candump -L`, `(1436509053.249713) can0 123#1122`:
+/// a data frame with an 11-bit identifier, on one of `channels`. `None` for every other line: the parser reads it. Most
+/// recordings have millions of such lines.
+pub(super) fn fixed_line(bytes: &[u8], channels: &[Channel]) -> Option<FixedLine> {
+    let (b"(", rest) = bytes.split_first_chunk::<1>()? else { return None };
+    let (seconds, rest) = rest.split_first_chunk::<10>()?;
+    let (b".", rest) = rest.split_first_chunk::<1>()? else { return None };
+    let (micros, rest) = rest.split_first_chunk::<6>()?;
+    let rest = rest.strip_prefix(b") ")?;
+    let after = |channel: &Channel| rest.strip_prefix(channel.name.as_bytes())?.strip_prefix(b" ");
+    let (channel, rest) = channels.iter().enumerate().find_map(|(at, channel)| Some((at, after(channel)?)))?;
+    let (&[first, second, third, b'#'], rest) = rest.split_first_chunk::<4>()? else { return None };
+    let id = CanId::standard(u16::from(hex(b'0', first)?) << 8 | u16::from(hex(second, third)?))?;
+    let (mut data, mut count) = ([0; 8], 0);
+    let (pairs, _) = rest.as_chunks::<2>();
+    for (place, &[high, low]) in data.iter_mut().zip(pairs) {
+        let Some(byte) = hex(high, low) else { break };
+        (*place, count) = (byte, count + 1);
     }
-    let frame = Frame::new(CanId::standard(id)?, &bytes[..pairs.len()]).ok()?;
-    let is_name = !channel.is_empty() && channel.iter().all(u8::is_ascii_graphic);
-    let channel = std::str::from_utf8(channel).ok().filter(|_| is_name)?;
-    let nanoseconds = u32::try_from(decimal(micros)?).ok()? * 1000;
-    Some((Wall::at(Duration::new(decimal(seconds)?, nanoseconds)), channel, frame))
+    let b'\n' = rest.get(2 * count)? else { return None };
+    let wall = Wall::at(Duration::new(decimal(seconds)?, u32::try_from(decimal(micros)?).ok()? * 1000));
+    let length = bytes.len() - rest.len() + 2 * count + 1;
+    Some(FixedLine { wall, channel, frame: Frame::new(id, &data[..count]).ok()?, length })
 }
 
-/// The bytes before and after the first `byte`.
-fn split_at_byte(bytes: &[u8], byte: u8) -> Option<(&[u8], &[u8])> {
-    let at = bytes.iter().position(|&it| it == byte)?;
-    Some((&bytes[..at], &bytes[at + 1..]))
+fn decimal<const N: usize>(digits: &[u8; N]) -> Option<u64> {
+    let is_number = digits.iter().fold(true, |all, digit| all & digit.is_ascii_digit());
+    let number = digits.iter().fold(0, |number, digit| number * 10 + u64::from(digit & 0x0f));
+    is_number.then_some(number)
 }
 
-/// A number of at least one digit.
-fn decimal(digits: &[u8]) -> Option<u64> {
-    let digit = |byte: u8| Some(byte.wrapping_sub(b'0')).filter(|digit| *digit < 10);
-    let number = digits.iter().try_fold(0u64, |number, &byte| Some(number * 10 + u64::from(digit(byte)?)));
-    number.filter(|_| !digits.is_empty())
+/// The byte with these two digits.
+fn hex(high: u8, low: u8) -> Option<u8> {
+    let (high, low) = (HEX_DIGITS[usize::from(high)], HEX_DIGITS[usize::from(low)]);
+    ((high | low) < 16).then_some(high << 4 | low)
 }
 
-fn hex_digit(byte: u8) -> Option<u8> {
-    match byte {
-        b'0'..=b'9' => Some(byte - b'0'),
-        b'A'..=b'F' => Some(byte - b'A' + 10),
-        b'a'..=b'f' => Some(byte - b'a' + 10),
-        _ => None,
+/// The value of each hexadecimal digit; 255 for other bytes.
+const HEX_DIGITS: [u8; 256] = {
+    let (mut values, mut value) = ([u8::MAX; 256], 0);
+    while value < 16 {
+        let digit = b"0123456789abcdef"[value as usize];
+        values[digit as usize] = value;
+        values[digit.to_ascii_uppercase() as usize] = value;
+        value += 1;
     }
-}
+    values
+};
 
 /// Whether a line has the screen form or the log form without time.
 pub(super) fn has_no_time(text: &str) -> bool {
@@ -203,16 +216,39 @@ mod tests {
         assert_eq!(frame("(1.5) can0  080   [0]").map(|(_, frame)| frame), Some("can0 080#".to_owned()));
     }
 
+    fn channels() -> [Channel; 2] {
+        ["can", "can0"].map(|name| Channel { name: name.to_owned(), is_wanted: true })
+    }
+
+    #[test]
+    fn fixed_line_ends_at_its_line_end() {
+        let line = "(1436509053.249713) can0 123#1122\n";
+        let at = Wall::at(Duration::new(1_436_509_053, 249_713_000));
+        let frame = "123#1122".parse().expect("a frame");
+        let expected = FixedLine { wall: at, channel: 1, frame, length: line.len() };
+        for rest in ["", "x", "(1436509053.249713) can0 124#\n"] {
+            let text = format!("{line}{rest}");
+            assert_eq!(fixed_line(text.as_bytes(), &channels()).as_ref(), Some(&expected), "{text}");
+        }
+        for end in 0..line.len() {
+            assert_eq!(fixed_line(&line.as_bytes()[..end], &channels()), None, "{end} bytes");
+        }
+        assert_eq!(fixed_line(line.as_bytes(), &channels()[..1]), None, "an unknown channel");
+    }
+
     proptest! {
         /// A line is read in the fixed form only if the parser reads it, with the same result.
         #[test]
         fn fixed_form_agrees_with_the_parser(
-            text in r"\(?[0-9]{0,11}[.][0-9]{5,7}\) ?[a-z0-9]{0,5} [0-9A-Fa-f]{2,4}#{1,2}[0-9A-FR]{0,18} ?R?",
+            text in r"\(?[0-9]{9,11}[.][0-9:]{5,7}\) ?(can|can0|can00|vcan)? [0-9A-Fa-fg]{2,4}#{1,2}[0-9A-FR]{0,18} ?R?",
             end in "[ \r]?\n?",
         ) {
             let line = text.clone() + &end;
-            if let Some((wall, channel, frame)) = fixed_line(line.as_bytes()) {
-                prop_assert_eq!(parse(line.trim()), Line::Event(wall, channel, Ok(frame)));
+            let channels = channels();
+            if let Some(fixed) = fixed_line(line.as_bytes(), &channels) {
+                let name = &channels[fixed.channel].name;
+                prop_assert_eq!(parse(line.trim()), Line::Event(fixed.wall, name, Ok(fixed.frame)));
+                prop_assert_eq!(fixed.length, line.len());
             }
         }
 
@@ -221,7 +257,8 @@ mod tests {
             let frame = Frame::new(CanId::standard(id).expect("11 bits"), &data[..length]).expect("8 bytes");
             let line = format!("({seconds:010}.{micros:06}) can0 {frame}\n");
             let wall = Wall::at(Duration::new(seconds, micros * 1000));
-            prop_assert_eq!(fixed_line(line.as_bytes()), Some((wall, "can0", frame)));
+            let expected = FixedLine { wall, channel: 1, frame, length: line.len() };
+            prop_assert_eq!(fixed_line(line.as_bytes(), &channels()), Some(expected));
         }
     }
 

@@ -80,6 +80,18 @@ impl Lines {
         Ok(self.ahead.back().map(|(_, line)| &line[..]))
     }
 
+    /// The bytes in the read buffer, which start with the next line. Empty if lines were read ahead.
+    pub(super) fn buffered(&self) -> &[u8] {
+        if self.ahead.is_empty() { self.reader.buffer() } else { &[] }
+    }
+
+    /// Skips the next line, which has `length` bytes and is in the read buffer. Returns its number.
+    pub(super) fn skip(&mut self, length: usize) -> u64 {
+        self.reader.consume(length);
+        self.number += 1;
+        self.number
+    }
+
     /// The number of lines read from the file.
     pub(super) fn count(&self) -> u64 {
         self.number

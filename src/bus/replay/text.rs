@@ -3,6 +3,7 @@
 use crate::bus::Fault;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
+use std::borrow::Cow;
 use std::time::Duration;
 
 /// Converts a date and time of a time zone, year to second, to seconds since 1970.
@@ -109,6 +110,20 @@ pub(super) fn local_time(_: [i32; 6]) -> Option<u64> {
 }
 
 /// A time zone for tests: days of 24 hours from 2000-01-01, months of 31 days.
+/// A line as text, without the escape sequences of `candump -c`.
+pub(super) fn text_of(bytes: &[u8]) -> Cow<'_, str> {
+    let text = String::from_utf8_lossy(bytes);
+    if !text.contains('\x1b') {
+        return text;
+    }
+    let mut parts = text.split('\x1b');
+    let mut plain = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        plain.push_str(part.split_once('m').map_or(part, |(_, rest)| rest));
+    }
+    Cow::Owned(plain)
+}
+
 #[cfg(test)]
 pub(super) fn test_zone([year, month, day, hour, minute, second]: [i32; 6]) -> Option<u64> {
     let days = ((year - 2000) * 12 + month - 1) * 31 + day - 1;

@@ -46,18 +46,34 @@ const DAY_US: u128 = 86_400_000_000;
 /// Decimal digits of a day, finer than a microsecond.
 const DAY_DIGITS: usize = 11;
 
+/// The bytes of a time without the microseconds: `2023-11-14T22:13:21.`.
+const SECOND_BYTES: usize = 20;
+
 /// Writes times. The text of a second is kept until the next second.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(in crate::output) struct Times {
     form: TimeForm,
     second: Option<u64>,
-    /// `2023-11-14T22:13:21`.
-    text: String,
+    /// The last time in RFC 3339.
+    text: [u8; 27],
 }
 
 impl Times {
     pub(in crate::output) fn new(form: TimeForm) -> Times {
-        Times { form, ..Times::default() }
+        Times { form, second: None, text: *b"1970-01-01T00:00:00.000000Z" }
+    }
+
+    /// Sets the text to the second of `since`.
+    fn start_second(&mut self, since: Duration) -> io::Result<()> {
+        let wall = Wall::at(Duration::from_secs(since.as_secs()));
+        // RFC 3339 and `system_time` do not allow years after 9999.
+        if wall > Wall::LAST {
+            return Err(io::Error::other("a time after the year 9999"));
+        }
+        let text = humantime::format_rfc3339_micros(wall.system_time()).to_string();
+        self.text[..SECOND_BYTES].copy_from_slice(&text.as_bytes()[..SECOND_BYTES]);
+        self.second = Some(since.as_secs());
+        Ok(())
     }
 
     /// A time as a JSON value: text or a number.
@@ -77,22 +93,10 @@ impl Times {
         match self.form {
             TimeForm::Rfc3339 => {
                 if self.second != Some(since.as_secs()) {
-                    use std::fmt::Write as _;
-                    self.text.clear();
-                    self.second = None;
-                    // RFC 3339 and `system_time` do not allow years after 9999.
-                    if wall > Wall::LAST {
-                        return Err(io::Error::other("a time after the year 9999"));
-                    }
-                    let whole = Wall::at(Duration::from_secs(since.as_secs())).system_time();
-                    write!(self.text, "{}", humantime::format_rfc3339_seconds(whole)).map_err(io::Error::other)?;
-                    self.text.pop();
-                    self.second = Some(since.as_secs());
+                    self.start_second(since)?;
                 }
-                out.extend_from_slice(self.text.as_bytes());
-                out.push(b'.');
-                push_padded(out, u64::from(since.subsec_micros()), 6);
-                out.push(b'Z');
+                self.text[SECOND_BYTES..][..6].copy_from_slice(&six_digits(since.subsec_micros()));
+                out.extend_from_slice(&self.text);
             }
             TimeForm::Unix => push_seconds(out, since, decimal),
             TimeForm::Excel => {
@@ -113,8 +117,18 @@ impl Times {
 /// Seconds with six decimals.
 pub(in crate::output) fn push_seconds(out: &mut Vec<u8>, length: Duration, decimal: u8) {
     push_number(out, length.as_secs());
-    out.push(decimal);
-    push_padded(out, u64::from(length.subsec_micros()), 6);
+    let [a, b, c, d, e, f] = six_digits(length.subsec_micros());
+    out.extend_from_slice(&[decimal, a, b, c, d, e, f]);
+}
+
+/// The last six decimal digits of a number.
+fn six_digits(mut number: u32) -> [u8; 6] {
+    let mut digits = [0; 6];
+    for digit in digits.iter_mut().rev() {
+        *digit = b'0' + (number % 10) as u8;
+        number /= 10;
+    }
+    digits
 }
 
 /// An integer.
@@ -134,16 +148,26 @@ fn push_padded(out: &mut Vec<u8>, mut number: u64, width: usize) {
     out.extend_from_slice(&digits[at..]);
 }
 
+/// 10⁰ to 10¹⁸.
+const POWERS_OF_TEN: [u64; 19] = {
+    let (mut powers, mut at) = ([1; 19], 1);
+    while at < powers.len() {
+        powers[at] = powers[at - 1] * 10;
+        at += 1;
+    }
+    powers
+};
+
 /// Writes a measured number; writes nothing for `None`.
 pub(super) fn push_value(out: &mut Vec<u8>, value: Option<Number>, decimal: u8) -> io::Result<()> {
     match value {
         None => {}
-        Some(Number::Decimal { mantissa, digits: digits @ 0..=18 }) if mantissa.unsigned_abs() < 1 << 63 => {
+        Some(Number::Decimal { mantissa, digits: digits @ 0..=18 }) if i64::try_from(mantissa).is_ok() => {
             if mantissa < 0 {
                 out.push(b'-');
             }
             let size = u64::try_from(mantissa.unsigned_abs()).unwrap_or(0);
-            let power = 10u64.pow(u32::from(digits));
+            let power = POWERS_OF_TEN[usize::from(digits)];
             push_number(out, size / power);
             if digits > 0 {
                 out.push(decimal);
@@ -188,10 +212,11 @@ fn push_short_real(out: &mut Vec<u8>, real: f32, decimal: u8) -> bool {
 /// Bytes in wire order, after `0x`.
 pub(super) fn push_raw(out: &mut Vec<u8>, raw: &Raw) {
     const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
-    out.extend_from_slice(b"0x");
-    for byte in raw.bytes() {
-        out.extend_from_slice(&[DIGITS[usize::from(byte >> 4)], DIGITS[usize::from(byte & 15)]]);
+    let (mut text, bytes) = (*b"0x0000000000000000", raw.bytes());
+    for (digits, byte) in text[2..].chunks_exact_mut(2).zip(bytes) {
+        (digits[0], digits[1]) = (DIGITS[usize::from(byte >> 4)], DIGITS[usize::from(byte & 15)]);
     }
+    out.extend_from_slice(&text[..2 + 2 * bytes.len()]);
 }
 
 /// Text; in quotes if it contains a delimiter, a quote or a line end.
@@ -250,7 +275,7 @@ mod tests {
 
     #[test]
     fn time_text_follows_the_second() {
-        let mut times = Times::default();
+        let mut times = Times::new(TimeForm::default());
         let mut out = Vec::new();
         for micros in [1_999_999, 2_000_000, 1_000_000] {
             times.write(&mut out, Wall::at(Duration::from_micros(micros)), b'.').expect("a time");

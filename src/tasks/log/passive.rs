@@ -27,8 +27,6 @@ pub(in crate::tasks) struct SetupListener {
     overheard: Overheard,
     /// Descriptions of devices whose identity is known from elsewhere.
     pub(in crate::tasks) recognised: Overrides,
-    /// COB-IDs of the TPDOs that are decoded.
-    decoded: BTreeSet<CanId>,
     /// COB-IDs of TPDOs whose mapping is unknown, and the nodes that sent them.
     pub(in crate::tasks) not_understood: BTreeMap<CanId, NodeId>,
 }
@@ -41,7 +39,6 @@ impl SetupListener {
             wanted: wanted.to_vec(),
             overheard: Overheard::default(),
             recognised: Overrides::new(),
-            decoded: BTreeSet::new(),
             not_understood: BTreeMap::new(),
         }
     }
@@ -61,8 +58,8 @@ impl SetupListener {
             return Some(node);
         }
         if let Some(node) = predefined_tpdo(frame)
+            && !decoder.decodes(frame.id())
             && self.nodes.contains(&node)
-            && !self.decoded.contains(&frame.id())
         {
             self.not_understood.insert(frame.id(), node);
         }
@@ -86,7 +83,6 @@ impl SetupListener {
     pub(in crate::tasks) fn forget(&mut self, node: NodeId, decoder: &mut Decoder) {
         self.overheard.forget(node, is_setup);
         decoder.remove(node);
-        self.decoded = decoder.can_ids().collect();
         if self.overrides.contains_key(&node) && self.nodes.contains(&node) {
             self.update(node, decoder);
         }
@@ -134,8 +130,7 @@ impl SetupListener {
         node.tpdos = tpdos;
         if !node.tpdos.is_empty() {
             decoder.replace(node.layout(), &node.all_wanted(&self.wanted));
-            self.decoded = decoder.can_ids().collect();
-            self.not_understood.retain(|id, _| !self.decoded.contains(id));
+            self.not_understood.retain(|&id, _| !decoder.decodes(id));
         }
     }
 

@@ -280,12 +280,12 @@ impl<'o> Recording<'o> {
                 self.emergencies.learn(&node);
                 self.synced.set_up(&node);
                 self.report_shared_cob_ids(received.at, observer);
+                self.update_sources();
             }
             let second = self.listener.as_mut().and_then(SetupListener::next_second_answer);
             if let Some((node, object, answers)) = second {
                 self.second_answer(node, object, answers, received.at, observer)?;
             }
-            self.update_sources();
         }
         let decoded = self.decoder.decode(received, &mut self.samples);
         if matches!(decoded, Decoded::Tpdo(_) | Decoded::OtherFrame)

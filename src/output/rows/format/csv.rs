@@ -1,12 +1,41 @@
 //! Rows as CSV, in both layouts.
 
 use super::{HeaderMismatch, RowFormat};
-use crate::measure::sample::Status;
+use crate::measure::sample::{Source, Status};
 use crate::output::rows::cells::{
     BOM, Dialect, TimeForm, Times, push_number, push_raw, push_seconds, push_text, push_texts, push_value,
 };
 use crate::output::rows::row::{Columns, Row, Values};
 use std::io;
+use std::sync::Arc;
+
+/// The cells of a source that are the same in all its rows, with the delimiters before and after them.
+#[derive(Debug)]
+struct SourceCells {
+    source: Source,
+    /// Node and signal.
+    before_value: Vec<u8>,
+    /// Unit.
+    after_value: Vec<u8>,
+}
+
+impl SourceCells {
+    fn new(source: &Source, delimiter: u8) -> SourceCells {
+        let (mut before_value, mut after_value) = (vec![delimiter], vec![delimiter]);
+        push_number(&mut before_value, u64::from(source.node.get()));
+        before_value.push(delimiter);
+        push_text(&mut before_value, &source.signal, delimiter);
+        before_value.push(delimiter);
+        push_text(&mut after_value, &source.unit, delimiter);
+        after_value.push(delimiter);
+        SourceCells { source: source.clone(), before_value, after_value }
+    }
+
+    fn is_of(&self, source: &Source) -> bool {
+        let Source { node, signal, unit } = source;
+        self.source.node == *node && Arc::ptr_eq(&self.source.signal, signal) && Arc::ptr_eq(&self.source.unit, unit)
+    }
+}
 
 /// Writes CSV.
 #[derive(Debug)]
@@ -16,6 +45,8 @@ pub(super) struct CsvRows {
     tag_names: Vec<String>,
     /// The cells of the tags, each after a delimiter.
     tag_cells: Vec<u8>,
+    /// The cells of the sources, by the numbers of the sources.
+    source_cells: Vec<Option<SourceCells>>,
 }
 
 impl CsvRows {
@@ -26,7 +57,7 @@ impl CsvRows {
             push_text(&mut tag_cells, value, dialect.delimiter);
         }
         let tag_names = tags.iter().map(|(name, _)| name.clone()).collect();
-        CsvRows { dialect, times: Times::new(time), tag_names, tag_cells }
+        CsvRows { dialect, times: Times::new(time), tag_names, tag_cells, source_cells: Vec::new() }
     }
 
     fn names(&self, columns: Columns<'_>) -> Vec<u8> {
@@ -67,15 +98,15 @@ impl RowFormat for CsvRows {
         push_seconds(out, row.elapsed, decimal);
         match row.values {
             Values::One { sample, source } => {
-                out.push(delimiter);
-                push_number(out, u64::from(source.node.get()));
-                out.push(delimiter);
-                push_text(out, &source.signal, delimiter);
-                out.push(delimiter);
+                if self.source_cells.len() <= sample.source {
+                    self.source_cells.resize_with(sample.source + 1, || None);
+                }
+                let known = &mut self.source_cells[sample.source];
+                known.take_if(|cells| !cells.is_of(source));
+                let cells = known.get_or_insert_with(|| SourceCells::new(source, delimiter));
+                out.extend_from_slice(&cells.before_value);
                 push_value(out, sample.value, decimal)?;
-                out.push(delimiter);
-                push_text(out, &source.unit, delimiter);
-                out.push(delimiter);
+                out.extend_from_slice(&cells.after_value);
                 push_status(out, sample.status);
                 out.push(delimiter);
                 push_raw(out, &sample.raw);
