@@ -68,6 +68,16 @@ struct Channel {
     seen: Option<(f64, f64)>,
     /// Other objects in the unit of the channel.
     follows: Vec<(ObjectId, Kind)>,
+    /// Their numbers at the last change of the unit.
+    converted: BTreeMap<ObjectId, Converted>,
+}
+
+/// A number before and after a change of the unit. If the old unit is set again, the number has no rounding error.
+#[derive(Clone, Debug)]
+struct Converted {
+    from: Unit,
+    before: Vec<u8>,
+    after: Vec<u8>,
 }
 
 /// One measured value as sent.
@@ -216,17 +226,26 @@ impl Channels {
     }
 
     /// Changes the unit of a channel and converts every object in this unit. `false` if the value cannot be converted.
-    pub(super) fn change_unit(&self, objects: &mut Objects, object: ObjectId, to: Unit) -> bool {
-        let Some(channel) = self.list.iter().find(|channel| channel.signal.unit == Some(object)) else { return false };
+    pub(super) fn change_unit(&mut self, objects: &mut Objects, object: ObjectId, to: Unit) -> bool {
+        let Some(channel) = self.list.iter_mut().find(|channel| channel.signal.unit == Some(object)) else {
+            return false;
+        };
         let from = channel.unit(objects);
         let (Some(_), Some(zero)) = (Unit(channel.quantity.channel().unit).convert(0.0, to), from.convert(0.0, to))
         else {
             return false;
         };
-        for (kept, kind) in &channel.follows {
-            let Some(old) = channel.pv(objects, *kept) else { continue };
-            let Some(point) = from.convert(old, to) else { continue };
-            channel.put_pv(objects, *kept, if *kind == Kind::Point { point } else { point - zero });
+        for (kept, kind) in channel.follows.clone() {
+            let Some(before) = objects.bytes(kept).map(<[u8]>::to_vec) else { continue };
+            match channel.converted.get(&kept) {
+                Some(last) if last.from == to && last.after == before => objects.put(kept, last.before.clone()),
+                _ => {
+                    let Some(point) = channel.pv(objects, kept).and_then(|old| from.convert(old, to)) else { continue };
+                    channel.put_pv(objects, kept, if kind == Kind::Point { point } else { point - zero });
+                }
+            }
+            let after = objects.bytes(kept).map(<[u8]>::to_vec).unwrap_or_default();
+            channel.converted.insert(kept, Converted { from, before, after });
         }
         objects.put(object, to.0.to_le_bytes().to_vec());
         true
@@ -294,14 +313,17 @@ impl Channel {
         let offset = (ObjectId::new(0x6127, sub), Kind::Distance);
         let described = model.description.objects.iter().filter(|entry| entry.follows_unit == Some(sub));
         let described = described.flat_map(|entry| entry.objects());
-        let follows = IN_PV_UNIT
+        let mut follows: Vec<(ObjectId, Kind)> = IN_PV_UNIT
             .into_iter()
             .flat_map(in_family)
             .chain([offset])
             .chain(described.map(|object| (object, Kind::Distance)))
             .filter(|(object, _)| objects.has(*object))
             .collect();
-        Channel { signal: signal.clone(), quantity, filter, seen: None, follows }
+        // A description may also state the objects of CiA 404.
+        follows.sort_by_key(|(object, _)| *object);
+        follows.dedup_by_key(|(object, _)| *object);
+        Channel { signal: signal.clone(), quantity, filter, seen: None, follows, converted: BTreeMap::new() }
     }
 
     /// The objects that contain a value of this channel.

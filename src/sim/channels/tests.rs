@@ -63,6 +63,29 @@ fn the_dps_manual_changes_psi_to_bar() {
 }
 
 #[test]
+fn old_unit_restores_the_numbers_without_rounding() {
+    let (mut objects, mut channels) = still("dps", 50.0, &[]);
+    for code in [0x4e_0000, 0xab_0000] {
+        assert!(channels.change_unit(&mut objects, id("6131:1"), Unit(code)));
+    }
+    // 6.895 bar are 100.004 psi.
+    assert_eq!(objects.real(id("2006")), Some(100_000.0));
+    // A number that was written meanwhile is converted.
+    assert!(channels.change_unit(&mut objects, id("6131:1"), Unit(0x4e_0000)));
+    objects.put(id("2006"), 6000i32.to_le_bytes().to_vec());
+    assert!(channels.change_unit(&mut objects, id("6131:1"), Unit(0xab_0000)));
+    assert_eq!(objects.real(id("2006")), Some(87_023.0));
+}
+
+#[test]
+fn each_number_is_converted_once() {
+    // The description of this device also states the objects of CiA 404 that follow the unit.
+    let (mut objects, mut channels) = still("hydac", 100.0, &[]);
+    assert!(channels.change_unit(&mut objects, id("6131:1"), Unit(0xab_0000)));
+    assert!((objects.real(id("6149:1")).expect("a number") - 5801.5).abs() < 0.1);
+}
+
+#[test]
 fn points_and_distances_are_converted_differently() {
     let (mut objects, mut channels) = still("mh4", 25.0, &[]);
     objects.put(id("6133:2"), 10f32.to_le_bytes().to_vec());
