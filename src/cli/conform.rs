@@ -15,7 +15,7 @@ use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Check a device against CiA 301, CiA 305 and its EDS
+/// Check a device against CiA 301, CiA 305, CiA 404 and its EDS
 ///
 /// The command runs a list of cases. Each case sends requests, right ones and wrong ones, and compares the answers with
 /// the standard. It prints a verdict for each case: pass, deviates, not-judged or not-applicable. A deviation that the
@@ -37,7 +37,7 @@ use std::sync::Arc;
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n  eds            EDS file (--eds)\n  timing         timing profile: figures without a verdict\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform 5 --eds sensor.eds --report new.html\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
+    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n  404            analogue inputs of CiA 404\n  eds            EDS file (--eds)\n  timing         timing profile: figures without a verdict\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform 5 --eds sensor.eds --report new.html\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
 )]
 pub(crate) struct Conform {
     #[command(subcommand)]

@@ -37,6 +37,24 @@ pub fn is_same(one: &str, other: &str) -> bool {
     !bare_word.is_empty() && bare_word == bare(other)
 }
 
+/// What a sensor measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measurand {
+    /// Pressure.
+    Pressure,
+    /// Temperature.
+    Temperature,
+}
+
+/// What a sensor with this code of 6110h measures; `None` if that is unknown. The unit of a voltage depends on the scaling.
+pub fn measurand(code: u16) -> Option<Measurand> {
+    match code {
+        1..=9 | 30..=33 | 100 => Some(Measurand::Temperature),
+        90 => Some(Measurand::Pressure),
+        _ => None,
+    }
+}
+
 /// The meaning of a code of 6110h; `None` if it is unknown. Codes above 10000 are manufacturer-specific.
 pub fn kind(code: u16) -> Option<&'static str> {
     KINDS.iter().find(|(known, _)| *known == code).map(|(_, kind)| *kind)
@@ -44,7 +62,7 @@ pub fn kind(code: u16) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{code, is_same, kind};
+    use super::{KINDS, Measurand, code, is_same, kind, measurand};
 
     #[test]
     fn codes_of_the_manuals() {
@@ -52,6 +70,18 @@ mod tests {
         assert_eq!(kind(100), Some("temperature transducer"));
         assert_eq!(kind(2), Some("thermocouple K"));
         assert_eq!(kind(10_501), None);
+    }
+
+    #[test]
+    fn measurand_is_that_of_the_kind() {
+        for (code, kind) in KINDS {
+            let expected = match kind {
+                "voltage" => None,
+                "pressure transducer" => Some(Measurand::Pressure),
+                _ => Some(Measurand::Temperature),
+            };
+            assert_eq!(measurand(code), expected, "{kind}");
+        }
     }
 
     #[test]

@@ -128,6 +128,10 @@ fn ascii(text: &str) -> String {
 impl Unit {
     /// No dimension.
     pub const NONE: Unit = Unit(0);
+    /// The base unit of pressures.
+    pub const PASCAL: Unit = Unit(0x0022_0000);
+    /// The base unit of temperatures.
+    pub const KELVIN: Unit = Unit(0x0005_0000);
 
     fn parts(self) -> (i8, u8, u8, u8) {
         let [reserved, denominator, numerator, prefix] = self.0.to_le_bytes();

@@ -3,6 +3,7 @@
 mod deviant;
 mod eds_text;
 mod table;
+mod table_404;
 mod table_eds;
 mod table_more;
 
@@ -147,6 +148,7 @@ fn each_deviation_is_found_by_its_case_and_by_no_other() {
         table_more::EMCY,
         table_more::STORE,
         table_more::LSS,
+        table_404::ROWS,
     ]
     .concat();
     // Without a file: it contains some of the facts that the other cases check.

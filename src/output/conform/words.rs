@@ -58,6 +58,11 @@ fn duration(length: Duration) -> String {
     format_duration(length)
 }
 
+/// A value with at most six digits: `14.5038`, `0.00012`.
+fn short(value: f64) -> String {
+    format!("{value:.5e}").parse().unwrap_or(value).to_string()
+}
+
 fn expected(expected: &Expected) -> String {
     match expected {
         Expected::Abort(list) => format!("abort {}", codes(list)),
@@ -102,6 +107,8 @@ fn expected(expected: &Expected) -> String {
         Expected::Limits(low, high) => limits(low.as_ref(), high.as_ref()),
         Expected::Mapped => "an accepted mapping".to_owned(),
         Expected::GenericErrorBit => "bit 0 set".to_owned(),
+        Expected::UnitLike(unit) => format!("a unit that can be converted to {unit}"),
+        Expected::Measured { value, tolerance } => format!("{} (+/- {})", short(*value), short(*tolerance)),
     }
 }
 
@@ -134,6 +141,8 @@ fn seen(seen: &Seen) -> String {
         Seen::Value(value) => format!("a default of {value}"),
         Seen::Acknowledged => "it was accepted".to_owned(),
         Seen::After(time) => format!("a frame after {}", duration(*time)),
+        Seen::Unit(unit) => unit.to_string(),
+        Seen::Measured(value) => short(*value),
     }
 }
 
@@ -160,6 +169,10 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::NeedsStore => "not run without --store".to_owned(),
         WhyNot::NoRemoteFrames => "this bus carries no remote frames".to_owned(),
         WhyNot::NotAlone => "not run, because other nodes are on the bus".to_owned(),
+        WhyNot::NoChannel => "the device has no analogue input of CiA 404".to_owned(),
+        WhyNot::UnknownCode(object) => format!("the meaning of the number in {object} is unknown"),
+        WhyNot::NearZero(object) => format!("{object} is too close to zero"),
+        WhyNot::NoValidValue(object) => format!("{object} is not valid, or at the end of its range"),
         WhyNot::Failed(failure) => ErrorMessage::of(failure).message,
     }
 }
@@ -181,5 +194,7 @@ mod tests {
         let text = "0x1017:0: expected abort 0x06070010 or 0x08000000; seen: abort 0x05040001, ";
         assert!(finding(&found).starts_with(text), "{}", finding(&found));
         assert_eq!(seen(&Seen::Period(Duration::from_micros(100_449))), "100.4 ms");
+        let near = Expected::Measured { value: 14.503_774, tolerance: 0.000_12 };
+        assert_eq!(expected(&near), "14.5038 (+/- 0.00012)");
     }
 }

@@ -25,6 +25,8 @@ pub enum Area {
     Store,
     /// LSS services.
     Lss,
+    /// The analogue inputs of CiA 404.
+    Cia404,
     /// The EDS file of the device.
     Eds,
     /// Answer times, jitter, boot-up times: figures without a verdict.
@@ -33,7 +35,7 @@ pub enum Area {
 
 impl Area {
     /// All areas, in the order in which they run.
-    pub const ALL: [Area; 10] = [
+    pub const ALL: [Area; 11] = [
         Area::Sdo,
         Area::Od,
         Area::Nmt,
@@ -42,6 +44,7 @@ impl Area {
         Area::Emcy,
         Area::Store,
         Area::Lss,
+        Area::Cia404,
         Area::Eds,
         Area::Timing,
     ];
@@ -57,6 +60,7 @@ impl Area {
             Area::Emcy => "emcy",
             Area::Store => "store",
             Area::Lss => "lss",
+            Area::Cia404 => "404",
             Area::Eds => "eds",
             Area::Timing => "timing",
         }
@@ -73,6 +77,7 @@ impl Area {
             Area::Emcy => "emergencies and error history",
             Area::Store => "store and restore",
             Area::Lss => "LSS services",
+            Area::Cia404 => "analogue inputs of CiA 404",
             Area::Eds => "EDS file (--eds)",
             Area::Timing => "timing profile: figures without a verdict",
         }
@@ -87,6 +92,7 @@ impl Area {
             | Area::ErrorControl
             | Area::Emcy
             | Area::Store
+            | Area::Cia404
             | Area::Eds
             | Area::Timing => true,
             Area::Pdo | Area::Lss => false,

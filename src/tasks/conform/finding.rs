@@ -7,6 +7,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::canopen::value::DataType;
 use crate::device::scalar::Scalar;
+use crate::device::unit::Unit;
 use crate::tasks::Failure;
 use std::time::Duration;
 
@@ -115,6 +116,15 @@ pub enum Expected {
     Limits(Option<Scalar>, Option<Scalar>),
     /// An accepted mapping of the object.
     Mapped,
+    /// A unit that can be converted to this one.
+    UnitLike(Unit),
+    /// A value in the unit of its channel.
+    Measured {
+        /// The value.
+        value: f64,
+        /// The largest difference.
+        tolerance: f64,
+    },
 }
 
 /// What was seen.
@@ -150,6 +160,10 @@ pub enum Seen {
     Value(Scalar),
     /// The device accepted it.
     Acknowledged,
+    /// A unit.
+    Unit(Unit),
+    /// A value in the unit of its channel.
+    Measured(f64),
 }
 
 /// Why a case has no verdict.
@@ -195,6 +209,14 @@ pub enum WhyNot {
     NoRemoteFrames,
     /// Other nodes are on the bus.
     NotAlone,
+    /// The device has no analogue input of CiA 404.
+    NoChannel,
+    /// The meaning of the number in this object is unknown.
+    UnknownCode(ObjectId),
+    /// The process value is so small that both expected values are the same.
+    NearZero(ObjectId),
+    /// The process value is not valid, or at the end of its range.
+    NoValidValue(ObjectId),
     /// A request failed.
     Failed(Box<Failure>),
 }

@@ -5,6 +5,7 @@
 
 mod alone;
 mod case;
+mod cia404;
 mod codes;
 mod eds;
 mod emcy;
@@ -48,7 +49,9 @@ use std::time::Duration;
 pub fn cases() -> impl Iterator<Item = &'static Case> {
     let sdo = [sdo::CASES, sdo::segments::CASES, sdo::general::CASES, sdo::blocks::CASES];
     let others = [od::CASES, nmt::CASES, error_control::CASES, pdo::CASES, pdo::mapping::CASES, pdo::locks::CASES];
-    sdo.into_iter().chain(others).chain([emcy::CASES, store::CASES, lss::CASES, eds::CASES, timing::CASES]).flatten()
+    let lower = [emcy::CASES, store::CASES, lss::CASES];
+    let cia404 = [cia404::values::CASES, cia404::unit::CASES];
+    sdo.into_iter().chain(others).chain(lower).chain(cia404).chain([eds::CASES, timing::CASES]).flatten()
 }
 
 /// What to check.

@@ -55,6 +55,11 @@ impl Settings {
         wanted.map(|(object, value)| (*object, value.clone())).collect()
     }
 
+    /// Whether the program must not write a setting.
+    pub(super) fn is_protected(&self, object: ObjectId) -> bool {
+        self.protected.contains(&object)
+    }
+
     /// The value of a setting before the first case.
     pub(super) fn before(&self, object: ObjectId) -> Option<&[u8]> {
         self.before.get(&object).map(Vec::as_slice)

@@ -59,13 +59,24 @@ pub struct Rescaled {
 
 /// The kind of conversion of a number if the unit of its signal changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Scale {
+pub(in crate::tasks) enum Scale {
     /// A measured value, which changes by itself.
     Moving,
     /// A point on the scale.
     Point,
     /// A distance on the scale.
     Distance,
+}
+
+impl Scale {
+    /// A number of this kind in another unit. `None` if it changes by itself, or if the quantities differ.
+    pub(in crate::tasks) fn convert(self, number: f64, from: Unit, to: Unit) -> Option<f64> {
+        match self {
+            Scale::Moving => None,
+            Scale::Point => from.convert(number, to),
+            Scale::Distance => Some(from.convert(number, to)? - from.convert(0.0, to)?),
+        }
+    }
 }
 
 /// The objects of CiA 404 in the unit of 6131h, as indices without the first digit.
@@ -202,7 +213,7 @@ fn choose<'a>(node: &'a Node, name: Option<&str>, unit: Unit) -> Result<&'a Sign
 }
 
 /// The objects in the unit of a signal.
-fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, Scale)> {
+pub(in crate::tasks) fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, Scale)> {
     let channel = signal.channel;
     let has_description = node.model.as_ref().is_some_and(|model| !model.dictionary.is_empty());
     // Without a description, only the family of the process value is read.
@@ -234,12 +245,7 @@ fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, Scale)> {
 fn is_stale(before: ValueWithUnit, after: ValueWithUnit, scale: Scale) -> bool {
     let (Some(from), Some(to)) = (before.unit, after.unit) else { return false };
     let (was, is) = (before.number.as_f64(), after.number.as_f64());
-    let Some((point, zero)) = from.convert(was, to).zip(from.convert(0.0, to)) else { return false };
-    let expected = match scale {
-        Scale::Moving => return false,
-        Scale::Point => point,
-        Scale::Distance => point - zero,
-    };
+    let Some(expected) = scale.convert(was, from, to) else { return false };
     let step = match after.number {
         Number::Decimal { digits, .. } => 10f64.powi(-i32::from(digits)),
         Number::Real32(_) | Number::Real64(_) => 0.0,
