@@ -15,11 +15,29 @@ impl Master<'_> {
     /// # Errors
     /// The bus failed, or the user interrupted.
     pub fn exchange(&mut self, request: Frame, answer: CanId, timeout: Duration) -> Result<Option<Received>, Error> {
+        self.exchange_watching(request, answer, timeout, &mut |_| {})
+    }
+
+    /// The same. `watch` is called with each frame that arrives until the answer, and with the answer.
+    ///
+    /// # Errors
+    /// The bus failed, or the user interrupted.
+    pub fn exchange_watching(
+        &mut self,
+        request: Frame,
+        answer: CanId,
+        timeout: Duration,
+        watch: &mut dyn FnMut(&Received),
+    ) -> Result<Option<Received>, Error> {
         self.outside_sdo(|master| {
             let now = master.now();
-            while master.next_raw(now)?.is_some() {}
+            while let Some(event) = master.next_raw(now)? {
+                if let Happening::Frame(received) = event {
+                    watch(&received);
+                }
+            }
             master.send(request);
-            master.first(answer, timeout)
+            master.first(answer, timeout, watch)
         })
     }
 
@@ -36,12 +54,20 @@ impl Master<'_> {
         })
     }
 
-    fn first(&mut self, answer: CanId, timeout: Duration) -> Result<Option<Received>, Error> {
+    fn first(
+        &mut self,
+        answer: CanId,
+        timeout: Duration,
+        watch: &mut dyn FnMut(&Received),
+    ) -> Result<Option<Received>, Error> {
         let until = self.now() + timeout;
         loop {
             match self.next_raw(until)? {
-                Some(Happening::Frame(received)) if received.frame.id() == answer && !received.frame.is_remote() => {
-                    return Ok(Some(received));
+                Some(Happening::Frame(received)) => {
+                    watch(&received);
+                    if received.frame.id() == answer && !received.frame.is_remote() {
+                        return Ok(Some(received));
+                    }
                 }
                 Some(_) => {}
                 None => return Ok(None),

@@ -1,6 +1,6 @@
 """Measuring devices on a CAN bus, made with python-canopen, for the tests of cangauge.
 
-    device.py [--record FILE] [--period MS] [--sync N] [--heartbeat MS] [--quiet] IFACE NODE:KIND...
+    device.py [--record FILE] [--eds FILE] [--period MS] [--sync N] [--heartbeat MS] [--quiet] IFACE NODE:KIND...
 
 KIND is one of:
 
@@ -14,6 +14,8 @@ program prints "ready" when all devices have booted, and ends on SIGTERM.
 n counts the values of a node from 0 since the start of this program, and wraps at 4096. Of eight values of "overload",
 the 5th is NaN with the status "positive overload" and the 6th is NaN with "negative overload". The 7th is a number with
 the status "invalid". --record writes "NODE,N,VALUE,STATUS" before each TPDO, with the value and status of the PDO.
+
+--eds writes the EDS file that python-canopen generates for the last node.
 
 2000h and 2001h are manufacturer-specific objects: UNSIGNED16 and a text.
 """
@@ -148,7 +150,11 @@ class Device:
         if not self.configured:
             self.configured = True
             # Reading subscribes to the COB-ID, which this device itself sends.
-            tpdo.read()
+            try:
+                tpdo.read()
+            except KeyError:
+                # The mapping has a missing object or too many entries: nothing is sent until it is changed.
+                tpdo.enabled = False
             if tpdo.enabled:
                 self.node.network.unsubscribe(tpdo.cob_id)
         return tpdo
@@ -194,6 +200,7 @@ def run_timer(device, stop):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--record", metavar="FILE")
+    parser.add_argument("--eds", metavar="FILE")
     parser.add_argument("--period", metavar="MS", type=int, default=50)
     parser.add_argument("--sync", metavar="N", type=int, default=0)
     parser.add_argument("--heartbeat", metavar="MS", type=int, default=0)
@@ -219,6 +226,8 @@ def main():
         for text in arguments.nodes:
             node, kind = text.split(":")
             devices.append(Device(network, int(node, 0), KINDS[kind], arguments, log))
+        if arguments.eds:
+            canopen.export_od(devices[-1].node.object_dictionary, arguments.eds)
         timers = [threading.Thread(target=run_timer, args=(device, stop)) for device in devices]
         for device in devices:
             device.boot()

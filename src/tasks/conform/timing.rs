@@ -125,12 +125,11 @@ fn silence(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
         if session.master.now().since(started) >= SILENCE_TIME {
             break;
         }
-        session.master.send(Frame::full(CanId::sdo_request(node.id), request(0x40, object, [0; 4])));
-        session.collect_until(timeout, |received| {
+        let frame = Frame::full(CanId::sdo_request(node.id), request(0x40, object, [0; 4]));
+        session.master.exchange_watching(frame, answer, timeout, &mut |received| {
             if is_from(&node, &received.frame) {
                 seen.push(received.at.mono);
             }
-            received.frame.id() == answer
         })?;
     }
     seen.push(session.master.now());
