@@ -116,18 +116,18 @@ impl FromStr for SignalArg {
         }
         // `6130:1` is an object; a hexadecimal word that starts with a letter, such as `face`, is a name.
         if text.starts_with(|first: char| first.is_ascii_digit()) {
-            let (object, stated) = match text.split_once('/') {
-                Some((object, stated)) if object.parse::<ObjectId>().is_ok() => {
-                    (object, Some(stated.parse::<DataType>().map_err(|error| error.to_string())?))
+            let (object, data_type) = match text.split_once('/') {
+                Some((object, data_type)) if object.parse::<ObjectId>().is_ok() => {
+                    (object, Some(data_type.parse::<DataType>().map_err(|error| error.to_string())?))
                 }
                 _ => (text, None),
             };
-            if let Some(stated) = stated.filter(|stated| !stated.is_number()) {
-                return Err(format!("\"{text}\": {stated} is not a number type (i16, u32, r32)"));
+            if let Some(data_type) = data_type.filter(|data_type| !data_type.is_number()) {
+                return Err(format!("\"{text}\": {data_type} is not a number type (i16, u32, r32)"));
             }
             match object.parse::<ObjectId>() {
-                Ok(object) => return Ok(SignalArg(Wanted::Object(object, stated))),
-                Err(error) if stated.is_some() || ObjectId::reads_as_address(text) => return Err(error.to_string()),
+                Ok(object) => return Ok(SignalArg(Wanted::Object(object, data_type))),
+                Err(error) if data_type.is_some() || ObjectId::reads_as_address(text) => return Err(error.to_string()),
                 Err(_) => {}
             }
         }
@@ -184,7 +184,7 @@ pub enum BusSpec {
     Sim(Option<String>),
     /// A recording: `FILE`, `FILE:CHANNEL`, or `-`.
     Replay(String),
-    /// An adapter or a server.
+    /// A serial adapter, or a socketcand server.
     Remote(Remote),
 }
 
@@ -210,7 +210,7 @@ impl FromStr for BusSpec {
 }
 
 impl BusSpec {
-    /// A short name for the bench: `can0`, `sim`, `replay`; the last part of the name of an adapter.
+    /// Returns a short name for the bench: `can0`, `sim`, `replay`. For an adapter, it is the last part of its name.
     pub(super) fn short_name(&self) -> String {
         match self {
             BusSpec::SocketCan(name) => name.clone(),
@@ -259,7 +259,7 @@ pub struct Tag {
 /// The longest name and the longest value of a tag, in bytes.
 const LONGEST_TAG: (usize, usize) = (64, 256);
 
-/// Names that have another meaning in a recording or at its receiver.
+/// Names that recordings, or the programs that receive them, use for other data.
 const RESERVED_TAGS: [&str; 12] =
     ["time", "elapsed_s", "node", "signal", "value", "unit", "status", "raw", "run", "row", "serial", "name"];
 
@@ -287,10 +287,10 @@ impl FromStr for Tag {
     }
 }
 
-/// The tags as pairs.
+/// Converts tags to pairs of name and value.
 ///
 /// # Errors
-/// The first name that occurs twice.
+/// A name occurs twice.
 pub(super) fn tag_pairs(tags: &[Tag]) -> Result<Vec<(String, String)>, String> {
     let mut pairs: Vec<(String, String)> = Vec::new();
     for Tag { key, value } in tags {
@@ -320,8 +320,8 @@ impl FromStr for InterfaceName {
 }
 
 fn interface(name: &str) -> Result<BusSpec, String> {
-    let fits = (1..16).contains(&name.len()) && !name.contains(['/', ' ', '\0']);
-    if fits {
+    let is_valid = (1..16).contains(&name.len()) && !name.contains(['/', ' ', '\0']);
+    if is_valid {
         Ok(BusSpec::SocketCan(name.to_owned()))
     } else {
         Err(format!("\"{name}\" is not the name of an interface"))
@@ -331,7 +331,7 @@ fn interface(name: &str) -> Result<BusSpec, String> {
 /// A description named by the user: `mh4`, `FILE.toml`, `5=mh4`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Override {
-    /// For this node only.
+    /// The node of the description; `None` for all nodes.
     pub node: Option<NodeId>,
     /// A built-in name or a file.
     pub what: String,

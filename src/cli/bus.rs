@@ -86,7 +86,7 @@ impl BusCommand {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             Action::List => {
-                let all: Vec<_> = host::list().into_iter().chain(adapters().into_iter().map(serial)).collect();
+                let all: Vec<_> = host::list().into_iter().chain(adapters().into_iter().map(describe_serial)).collect();
                 if all.is_empty() {
                     global.console().note("this computer has no CAN interface and no serial adapter");
                 }
@@ -102,8 +102,8 @@ impl BusCommand {
     }
 }
 
-/// A serial adapter as an interface. Its bit rate is chosen when it is opened.
-fn serial(found: SerialAdapter) -> Interface {
+/// Describes a serial adapter as an interface. It has no bit rate yet: the user chooses it with `--bus`.
+fn describe_serial(found: SerialAdapter) -> Interface {
     let kind = Some("serial".to_owned());
     Interface {
         interface: format!("slcan:{}", found.path),
@@ -142,13 +142,13 @@ impl Detect {
         let detection = detection?;
         finished?;
         let report = BitRateReport { interface, detection };
-        let Some((_, by)) = report.detection.found else {
+        let Some((_, evidence)) = report.detection.found else {
             global.print_json(std::slice::from_ref(&report))?;
             let BitRateReport { interface, detection } = report;
             return Err(Failure::general(DetectFailure::NotFound { interface, detection, active: self.active }).into());
         };
         global.print(std::slice::from_ref(&report))?;
-        if by == Evidence::Acknowledge {
+        if evidence == Evidence::Acknowledge {
             console.warn("requests were acknowledged only at this bit rate, but no node answered");
         }
         Ok(())

@@ -139,7 +139,7 @@ impl Check {
 
     /// Writes the reports for CI servers.
     fn deliver(&self, global: &Global, file: Option<ReportFile>, report: &CheckReport) -> anyhow::Result<()> {
-        // Errors as JSON stay alone on stderr, unless annotations are requested.
+        // With errors as JSON, stderr contains nothing else, unless annotations are requested.
         let is_automatic =
             || env::var_os("GITHUB_ACTIONS").is_some_and(|value| value == "true") && !global.console().json;
         if self.annotate.is_some() || is_automatic() {
@@ -155,7 +155,7 @@ impl Check {
         file.map_or(Ok(()), |file| file.write(junit::document(report).as_bytes()))
     }
 
-    /// Checks the arguments that need no bus.
+    /// Checks the arguments before the bus is opened.
     fn validate(&self, global: &Global) -> anyhow::Result<()> {
         if let Nodes::These(nodes) = &self.nodes {
             self.expressions.iter().try_for_each(|expression| expression.check_nodes(nodes)).map_err(Failure::from)?;
@@ -171,7 +171,7 @@ impl Check {
         }
     }
 
-    /// Checks the names of figures, and that they are measured for some time.
+    /// Checks the names of figures, and that a measuring time is given.
     fn validate_figures(&self, is_replay: bool) -> anyhow::Result<()> {
         let known = health::names();
         for expression in &self.expressions {
@@ -203,7 +203,7 @@ impl Check {
             return self.measure_signals(&signals, global, waited);
         }
         let measured = global.with_master(|master| {
-            let (nodes, reads) = (live_nodes(&self.nodes, master, global)?, master.bus().is_live());
+            let (nodes, reads) = (nodes_to_check(&self.nodes, master, global)?, master.bus().is_live());
             let (duration, bit_rate) = (self.duration.map(|duration| duration.0.saturating_sub(waited)), None);
             let overrides = descriptions::overrides(global, &nodes)?;
             Ok(check_figures(master, &figures, &HealthOptions { nodes, reads, duration, bit_rate, overrides })?)
@@ -216,7 +216,7 @@ impl Check {
         Ok(report)
     }
 
-    /// `waited` is the part of the time that has passed.
+    /// Measures the signals. `waited` (the wait for the reader of a FIFO) is subtracted from the duration.
     fn measure_signals(
         &self,
         expressions: &[Expression],
@@ -224,13 +224,13 @@ impl Check {
         waited: StdDuration,
     ) -> anyhow::Result<CheckReport> {
         let duration = self.duration.map(|duration| duration.0.saturating_sub(waited));
-        let (shows, color) = (duration.is_some() && global.shows_progress(), global.console().color);
-        let progress = CheckProgress::new(shows, color, duration.unwrap_or_default());
+        let (shows_progress, color) = (duration.is_some() && global.shows_progress(), global.console().color);
+        let progress = CheckProgress::new(shows_progress, color, duration.unwrap_or_default());
         let console = Console { progress: Some(progress.multi()), ..global.console() };
         global.with_claims(|master, claims| {
             // A replayed recording is receive-only, and is checked from its start to its end.
             let live = master.bus().is_live();
-            let nodes = live_nodes(&self.nodes, master, global)?;
+            let nodes = nodes_to_check(&self.nodes, master, global)?;
             let mode = if live { self.mode() } else { Mode::Passive };
             let options = CheckOptions {
                 overrides: descriptions::overrides_on(master, global, &nodes)?,
@@ -239,7 +239,7 @@ impl Check {
                 expressions: expressions.to_vec(),
                 recording: (duration.is_some() || !live).then_some((mode, duration)),
             };
-            // Without --poll, the nodes are only used until the recording starts.
+            // Without --poll, the nodes are locked only until the recording starts.
             let claims = self.poll.is_none().then(|| std::mem::take(claims));
             let mut view = View { progress, console, started: None, claims };
             let report = check(master, &options, &mut view);
@@ -258,8 +258,8 @@ impl Check {
     }
 }
 
-/// The nodes to check; in a recording, `all` means every node-ID.
-fn live_nodes(nodes: &Nodes, master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
+/// Returns the nodes to check. In a replayed recording, `all` means every node-ID.
+fn nodes_to_check(nodes: &Nodes, master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
     match nodes {
         Nodes::All if !master.bus().is_live() => Ok(NodeId::all().collect()),
         nodes => open::nodes(master, global, nodes),

@@ -76,7 +76,7 @@ impl Completions {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        // Generated in memory first, because the generator panics on a closed pipe.
+        // The script is generated in memory, because the generator panics on a closed pipe.
         let text = match (self.action, self.shell) {
             (Some(Action::Install), shell) => install(shell, global)?,
             (Some(Action::Print(_)), Some(shell)) => {
@@ -116,7 +116,7 @@ fn install(shell: Option<Shell>, global: &Global) -> anyhow::Result<Vec<u8>> {
     Ok(format!("{}\n", path.display()).into_bytes())
 }
 
-/// The scripts ask the program, which knows the command line.
+/// The scripts for bash, zsh and fish call `cangauge completions -- WORDS`, which prints the matching words.
 const BASH: &str = r#"# COMP_WORDS would split sim:mh4@5 and ai-input-pv:1.
 _cangauge() {
     local -a line
@@ -184,9 +184,9 @@ pub fn script(shell: Shell) -> Vec<u8> {
 /// Units that are offered for `--in` and `unit`.
 const UNITS: &[&str] = &["bar", "mbar", "Pa", "hPa", "kPa", "MPa", "psi", "degC", "degF", "K", "deg", "mm"];
 
-/// What a word can be.
+/// The kinds of words that can be completed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Place {
+enum WordKind {
     Bus,
     /// A CAN interface of this computer.
     Interface,
@@ -197,42 +197,42 @@ enum Place {
     Other,
 }
 
-/// Returns what a word can be. `command` is its command, `count` the number of arguments before it, `option` the option
-/// before it.
-fn place(command: &[&str], count: usize, option: Option<&str>) -> Place {
+/// Returns the kind of the word to complete. `command`: the commands before it. `count`: the number of positional
+/// arguments before it. `option`: the option directly before it.
+fn word_kind(command: &[&str], count: usize, option: Option<&str>) -> WordKind {
     match (option, command) {
-        (Some("bus"), _) => Place::Bus,
-        (Some("device"), _) | (None, ["devices", "show"] | ["sim"]) => Place::Device,
-        (Some("in"), _) => Place::Words(UNITS),
-        (Some("transmission"), _) => Place::Words(&["acyclic", "event", "sync:1", "timer"]),
-        (Some(_), _) => Place::Other,
-        (None, ["bus", "detect"]) if count == 0 => Place::Bus,
-        (None, ["bus", _]) if count == 0 => Place::Interface,
-        (None, ["objects"]) if count == 0 => Place::Device,
-        (None, ["pdo", "show" | "map"]) if count == 1 => Place::Words(&["1", "2", "3", "4"]),
-        (None, ["unit"]) if count == 2 => Place::Words(UNITS),
-        (None, ["objects"] | ["sdo", "read" | "write"]) if count > 0 => Place::Name(true),
-        (None, ["log" | "read" | "check"]) if count > 0 => Place::Name(true),
-        (None, ["pdo", "map"]) if count > 1 => Place::Name(true),
-        (None, ["unit" | "filter" | "limits"]) if count == 1 => Place::Name(false),
-        _ => Place::Other,
+        (Some("bus"), _) => WordKind::Bus,
+        (Some("device"), _) | (None, ["devices", "show"] | ["sim"]) => WordKind::Device,
+        (Some("in"), _) => WordKind::Words(UNITS),
+        (Some("transmission"), _) => WordKind::Words(&["acyclic", "event", "sync:1", "timer"]),
+        (Some(_), _) => WordKind::Other,
+        (None, ["bus", "detect"]) if count == 0 => WordKind::Bus,
+        (None, ["bus", _]) if count == 0 => WordKind::Interface,
+        (None, ["objects"]) if count == 0 => WordKind::Device,
+        (None, ["pdo", "show" | "map"]) if count == 1 => WordKind::Words(&["1", "2", "3", "4"]),
+        (None, ["unit"]) if count == 2 => WordKind::Words(UNITS),
+        (None, ["objects"] | ["sdo", "read" | "write"]) if count > 0 => WordKind::Name(true),
+        (None, ["log" | "read" | "check"]) if count > 0 => WordKind::Name(true),
+        (None, ["pdo", "map"]) if count > 1 => WordKind::Name(true),
+        (None, ["unit" | "filter" | "limits"]) if count == 1 => WordKind::Name(false),
+        _ => WordKind::Other,
     }
 }
 
-/// The words that fit at the end, some with a description. Empty if the last word is a file name.
+/// Returns the words that complete the last word, each with a description or "". Empty if it is a file name.
 fn names(line: &[String], global: &Global) -> BTreeMap<String, String> {
     let Some((last, before)) = line.split_last() else { return BTreeMap::new() };
     let mut program = program();
-    // Arguments of nested commands are made lazily.
+    // Without `build`, clap has not yet created the arguments of nested commands.
     program.build();
     let mut command = &program;
     let (mut path, mut positional, mut option) = (Vec::new(), Vec::new(), None::<&Arg>);
     let mut sources = Vec::new();
     for word in before {
         if let Some(option) = option.take() {
-            sources.extend(source(option.get_long().unwrap_or_default(), word));
+            sources.extend(named_file(option.get_long().unwrap_or_default(), word));
         } else if let Some((name, value)) = word.strip_prefix("--").and_then(|word| word.split_once('=')) {
-            sources.extend(source(name, value));
+            sources.extend(named_file(name, value));
         } else if word.len() > 1 && word.starts_with('-') {
             option = find_option(&program, command, word).filter(|option| option.get_action().takes_values());
         } else if let Some(sub) = command.find_subcommand(word).filter(|_| positional.is_empty()) {
@@ -248,18 +248,18 @@ fn names(line: &[String], global: &Global) -> BTreeMap<String, String> {
     let argument = option.or_else(|| command.get_positionals().nth(positional.len()));
     let plain = |names: Vec<String>| names.into_iter().map(|name| (name, String::new())).collect();
     let mut found: Vec<(String, String)> =
-        match place(&path, positional.len(), option.and_then(|option| option.get_long())) {
-            Place::Bus => plain(buses()),
-            Place::Interface => plain(open::interfaces().into_iter().map(|(name, _)| name).collect()),
-            Place::Device => plain(device_names().collect()),
-            Place::Words(words) => plain(words.iter().map(ToString::to_string).collect()),
-            Place::Name(with_objects) => {
+        match word_kind(&path, positional.len(), option.and_then(|option| option.get_long())) {
+            WordKind::Bus => plain(buses()),
+            WordKind::Interface => plain(open::interfaces().into_iter().map(|(name, _)| name).collect()),
+            WordKind::Device => plain(device_names().collect()),
+            WordKind::Words(words) => plain(words.iter().map(ToString::to_string).collect()),
+            WordKind::Name(with_objects) => {
                 let own = positional.first().filter(|_| path == ["objects"]).map(|device| (*device, false));
                 let sources = own.into_iter().chain(sources);
                 let models: Vec<_> = sources.filter_map(|(file, is_eds)| model(file, is_eds, global)).collect();
                 plain(names_of(&models, with_objects))
             }
-            Place::Other => argument.map(values).unwrap_or_default(),
+            WordKind::Other => argument.map(values).unwrap_or_default(),
         };
     if option.is_none() && positional.is_empty() {
         found.extend(visible(command.get_subcommands()));
@@ -267,8 +267,8 @@ fn names(line: &[String], global: &Global) -> BTreeMap<String, String> {
     let takes_file = argument.is_some_and(|argument| {
         argument.get_value_names().is_some_and(|names| names.iter().any(|name| name.contains("FILE")))
     });
-    let is_nothing = last.is_empty() && found.is_empty() && !takes_file;
-    if option.is_none() && (last.starts_with('-') || is_nothing) {
+    let has_no_candidates = last.is_empty() && found.is_empty() && !takes_file;
+    if option.is_none() && (last.starts_with('-') || has_no_candidates) {
         found.extend(options(command).chain(options(&program)));
     }
     let found = found.into_iter().map(|(name, about)| (format!("{prefix}{name}"), about));
@@ -293,7 +293,7 @@ fn options(command: &Command) -> impl Iterator<Item = (String, String)> {
     shown.filter_map(move |argument| Some((format!("--{}", argument.get_long()?), help(argument))))
 }
 
-/// The values of an argument that has a fixed set of them.
+/// Returns the possible values of an argument, with descriptions. Empty if the argument has no fixed set of values.
 fn values(argument: &Arg) -> Vec<(String, String)> {
     let shown = argument.get_possible_values().into_iter().filter(|value| !value.is_hide_set());
     shown
@@ -323,8 +323,8 @@ fn find_option<'a>(program: &'a Command, command: &'a Command, word: &str) -> Op
     }
 }
 
-/// The description or EDS that an option names.
-fn source<'a>(option: &str, value: &'a str) -> Option<(&'a str, bool)> {
+/// Returns the file named by `--device` or `--eds`, and whether it is an EDS.
+fn named_file<'a>(option: &str, value: &'a str) -> Option<(&'a str, bool)> {
     ["device", "eds"].contains(&option).then_some((value, option == "eds"))
 }
 
@@ -333,7 +333,7 @@ fn model(file: &str, is_eds: bool, global: &Global) -> Option<Arc<Model>> {
     descriptions::model(&what, is_eds, global).ok()
 }
 
-/// The names in these descriptions; without one, the signals of all built-in descriptions and the standard's objects.
+/// Returns the names in `models`. If it is empty, returns all built-in signals and the objects of the standards.
 fn names_of(models: &[Arc<Model>], with_objects: bool) -> Vec<String> {
     let signals = |model: &Arc<Model>| {
         let node = offline(NodeId::MIN, model);

@@ -46,7 +46,7 @@ enum Action {
     /// Compare a device with a file, two devices, or two files; exit 1 if anything differs
     Diff(diff::Diff),
     /// Configure a device from a file: check the file, write the differences, read everything back
-    // Not at the type: its deferred help would replace the line about the global options.
+    // Not at the type `Apply`: clap builds its help later, which would replace the line about the global options.
     #[command(
         after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply --table forty.csv mh4.toml --address --store --record forty.html\n  cangauge config apply 1 --rollback"
     )]
@@ -78,7 +78,7 @@ impl Config {
         }
     }
 
-    /// Whether the command only reads. A description of another device is then only a warning.
+    /// Whether the command only reads. A description for another device then causes a warning and no error.
     pub(super) fn only_reads(&self) -> bool {
         !matches!(self.action, Action::Apply(_))
     }
@@ -105,10 +105,10 @@ impl Dump {
     }
 }
 
-/// The longest file that is read.
+/// The maximum size of a settings file, in bytes.
 const MAX_FILE: u64 = 16 << 20;
 
-/// Reads a file with settings: TOML, or a DCF by its name.
+/// Reads a settings file: a DCF if the extension is dcf or eds, otherwise TOML.
 fn file(name: &str, global: &Global) -> anyhow::Result<tasks::config::File> {
     let extension = Path::new(name).extension().map(|extension| extension.to_ascii_lowercase());
     if extension.is_none_or(|extension| extension != "dcf" && extension != "eds") {
@@ -146,7 +146,7 @@ fn parse(file: &str, text: &str) -> anyhow::Result<Document> {
     })
 }
 
-/// The mistakes of a file as one error.
+/// Combines the mistakes of a file into one error.
 fn mistakes(file: &str, mistakes: Vec<Mistake>) -> anyhow::Error {
     let failures = ConfigFailure::of_mistakes(file, None, mistakes);
     match super::exit::several_each(1, vec![failures]) {
@@ -155,7 +155,7 @@ fn mistakes(file: &str, mistakes: Vec<Mistake>) -> anyhow::Error {
     }
 }
 
-/// The device of a file, from its description. `None` if the file contains no device, or an unknown one.
+/// Returns the device that the file names in `device.kind`, as described. `None` if the kind is missing or unknown.
 fn described(document: &Document) -> Option<Node> {
     let Item::Text(kind) = &document.get("device.kind")?.value else { return None };
     let model = catalog::by_name(kind)?;
@@ -165,7 +165,7 @@ fn described(document: &Document) -> Option<Node> {
 /// The failures of several nodes, one list for each node.
 type Failures = Vec<Vec<Failure>>;
 
-/// Splits the positional arguments: the file is the last one.
+/// Splits the positional arguments into nodes and file. `None` if they are not exactly these two.
 fn nodes_and_file(words: &[String]) -> Option<(Nodes, &str)> {
     match words {
         [nodes, file] => Some((nodes.parse().ok()?, file)),

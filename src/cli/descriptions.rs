@@ -45,11 +45,11 @@ impl Named {
     }
 }
 
-/// A file and a node with a different device.
+/// Each entry: the position of a file in the list, and a node that has a different device.
 type Mismatches = BTreeSet<(usize, NodeId)>;
 
-/// The descriptions named by the user, for
-/// `nodes`. For a single node, the device is compared with the files when the bus is opened: see [`check_pending`].
+/// Reads the descriptions that the user named, for `nodes`. For a single node, [`check_pending`] compares the device
+/// with the files when the bus is opened.
 pub(super) fn overrides(global: &Global, nodes: &[NodeId]) -> anyhow::Result<Overrides> {
     let named = named(global)?;
     let overrides = combine(&named, nodes, &Mismatches::new());
@@ -59,7 +59,7 @@ pub(super) fn overrides(global: &Global, nodes: &[NodeId]) -> anyhow::Result<Ove
     Ok(overrides)
 }
 
-/// The descriptions named by the user, for the matching `nodes`.
+/// Reads the descriptions that the user named, and assigns them to the matching `nodes`.
 ///
 /// # Errors
 /// A file is not for the device of its node. A file without a node does not match any node.
@@ -77,7 +77,7 @@ pub(super) fn check_pending(master: &mut Master<'_>, global: &Global) -> anyhow:
     }
 }
 
-/// One description for each node. A description for this node has priority over one for all nodes, and a description
+/// Chooses one description for each node. A description for this node has priority over one for all nodes, and a description
 /// has priority over an EDS.
 fn combine(named: &[Named], nodes: &[NodeId], mismatches: &Mismatches) -> Overrides {
     let mut overrides = Overrides::new();
@@ -148,7 +148,7 @@ fn mismatches(
     Ok(mismatches)
 }
 
-/// Whether the device has the profile (1000h) of a description, as far as both are known.
+/// Whether the device and the description have the same profile (1000h). True if one of the profiles is unknown.
 fn has_profile_of(master: &mut Master<'_>, node: NodeId, model: &Model) -> anyhow::Result<bool> {
     let object = ObjectId::DEVICE_TYPE;
     let described = model.dictionary.get(object).and_then(|entry| entry.default_bytes(node));
@@ -284,7 +284,7 @@ fn print_warnings(file: &str, warnings: &[eds::Warning], global: &Global) {
 /// Prints the warnings of a DCF about its parameter values; with `-v` they were printed before.
 pub(super) fn warn_about_values(file: &str, dcf: &eds::Eds, global: &Global) {
     let lines: BTreeSet<usize> = dcf.value_lines.values().copied().collect();
-    // The second of two values is in another line than the value that is used.
+    // The warning about a repeated value has the line of the unused value, so it is recognised by its text.
     let is_about = |warning: &&eds::Warning| lines.contains(&warning.line) || warning.text.contains("ParameterValue");
     let about = dcf.warnings.iter().filter(|_| global.verbose == 0 && dcf.warnings.len() > 1).filter(is_about);
     about.for_each(|warning| global.console().warn(&format!("{file}:{}: {}", warning.line, warning.text)));

@@ -27,7 +27,7 @@ impl Command {
         }
     }
 
-    /// The reaction if two devices have one node-ID.
+    /// Returns the reaction if two devices have the same node-ID.
     pub(super) fn on_two_devices(&self) -> OnTwoDevices {
         let writes = match self {
             Command::Scan(_) => return OnTwoDevices::Report,

@@ -39,7 +39,7 @@ pub(super) struct Messages {
 /// The result of a command for several nodes: success if no node failed.
 ///
 /// # Errors
-/// The failures, with the kind of [`combined`].
+/// The failures. [`combined`] determines the kind.
 pub(super) fn several(asked: usize, failures: Vec<Failure>) -> Result<(), Several> {
     let kinds: Vec<Kind> = failures.iter().map(Failure::kind).collect();
     match combined(asked, &kinds) {
@@ -60,7 +60,7 @@ pub(super) fn several_each(asked: usize, failures: Vec<Vec<Failure>>) -> Result<
     }
 }
 
-/// The kind that decides the exit code. `kinds` are the failures of `asked` nodes. `None` without a failure.
+/// Returns the kind that decides the exit code; `None` without a failure. `kinds`: one for each failed node of `asked`.
 ///
 /// A bus failure and Ctrl-C end the command at once, so they decide alone. Otherwise:
 /// `partial` if some nodes succeeded, the common kind if all failures have the same kind, else `unexpected`.
@@ -146,7 +146,7 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The message of the parser of the value, with the value added if it is missing.
+/// Returns the message of the value parser. Adds the value if the message does not contain it.
 fn wrong_value(error: &clap::Error) -> Option<String> {
     let source = std::error::Error::source(error)?;
     let inner = match source.downcast_ref::<ParseIntError>().map(ParseIntError::kind) {
@@ -159,11 +159,10 @@ fn wrong_value(error: &clap::Error) -> Option<String> {
     Some(if named { inner } else { format!("\"{value}\" for {argument}: {inner}") })
 }
 
-/// Whether to print errors as JSON. Parsing has failed, so this function looks for the option in
-/// the words.
+/// Whether to print errors as JSON. Parsing has failed, so this function looks for the option in the words.
 fn wants_json(words: &[String]) -> bool {
-    let apart = words.windows(2).any(|pair| matches!(pair[0].as_str(), "-f" | "--format") && pair[1] == "json");
-    apart || words.iter().any(|word| word == "-fjson" || word == "--format=json")
+    let is_separate = words.windows(2).any(|pair| matches!(pair[0].as_str(), "-f" | "--format") && pair[1] == "json");
+    is_separate || words.iter().any(|word| word == "-fjson" || word == "--format=json")
 }
 
 /// The command line that shows the help of the command in `words`.
@@ -181,8 +180,8 @@ fn help_for(words: &[String]) -> String {
             }) {
                 words.next();
             }
-        } else if let Some(below) = command.find_subcommand(word) {
-            command = below;
+        } else if let Some(subcommand) = command.find_subcommand(word) {
+            command = subcommand;
             line = format!("{line} {word}");
         } else {
             break;
@@ -201,10 +200,10 @@ fn print(console: &Console, error: &anyhow::Error) -> u8 {
     for message in &messages {
         console.fail(message, code(message.kind));
     }
-    let decides = error.downcast_ref::<Several>().map(|several| several.kind);
+    let kind = error.downcast_ref::<Several>().map(|several| several.kind);
     #[cfg(feature = "publish")]
-    let decides = decides.or(error.downcast_ref::<Messages>().map(|messages| messages.kind));
-    decides.or(messages.first().map(|message| message.kind)).map_or(0, code)
+    let kind = kind.or(error.downcast_ref::<Messages>().map(|messages| messages.kind));
+    kind.or(messages.first().map(|message| message.kind)).map_or(0, code)
 }
 
 /// The messages to print; none if only the output pipe was closed.
@@ -244,8 +243,8 @@ pub(super) fn open_stdout() -> anyhow::Result<io::Stdout> {
     crate::bus::stdout::stdout().map_err(stdout)
 }
 
-/// The message of an error if no bus can be used, which `doctor` reports as a finding. `None` if another program uses
-/// the node.
+/// Returns the message of an error that means: no bus can be used. `doctor` reports it as a finding. `None` if another
+/// program uses the node.
 pub(super) fn bus_error(error: &anyhow::Error, has_interface: bool) -> Option<ErrorMessage> {
     let message = message(error);
     let cause = error.downcast_ref::<Failure>().map(|failure| &failure.cause);
@@ -254,7 +253,7 @@ pub(super) fn bus_error(error: &anyhow::Error, has_interface: bool) -> Option<Er
     (is_about_bus && !is_in_use).then_some(message)
 }
 
-/// An error of writing to stdout. A closed pipe ends the command with success.
+/// Converts the error of a write to stdout. A closed pipe ends the command with success.
 pub(super) fn stdout(error: io::Error) -> anyhow::Error {
     if error.kind() == io::ErrorKind::BrokenPipe {
         ClosedPipe.into()

@@ -70,7 +70,7 @@ impl OutFile {
         let is_dangling_link = metadata.is_none() && path.symlink_metadata().is_ok();
         let is_new = metadata.is_none() && !is_dangling_link;
         let is_regular = metadata.is_some_and(|metadata| metadata.is_file());
-        // A FIFO or a device is used as it is.
+        // An existing FIFO or device file is only opened.
         if is_new || existing == Existing::Refuse && is_regular {
             options.create_new(true);
         }
@@ -121,7 +121,7 @@ impl OutFile {
     /// Writes the whole content, after the bytes that are kept.
     pub(super) fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         let emptied = if self.is_regular() { self.file.set_len(self.keep) } else { Ok(()) };
-        // An object of 0 bytes is also content, so the file is kept.
+        // The content may be an object of 0 bytes, so an empty file is kept.
         self.is_new = false;
         emptied.and_then(|()| self.file.write_all(bytes)).map_err(|source| self.error(source))
     }
@@ -152,7 +152,7 @@ pub(super) struct ReportFile {
     temporary: Option<PathBuf>,
     /// The report that will be replaced. Its lock prevents writes by other programs.
     _replaced: Option<File>,
-    /// The whole lines of the existing report, if it is continued.
+    /// The complete lines of the existing report, if the new report is appended.
     before: Vec<u8>,
     /// The time for which the program waited for the reader of a FIFO.
     pub(super) waited: Duration,
@@ -235,7 +235,7 @@ pub(super) fn lock_output(file: &File, path: &Path) -> Result<(), ErrorMessage> 
     })
 }
 
-/// Why a FIFO was not opened.
+/// Converts the error of waiting for the reader of a FIFO.
 pub(super) fn no_reader(path: &Path, source: io::Error) -> anyhow::Error {
     let name = path.display();
     match source.kind() {

@@ -39,8 +39,8 @@ pub(crate) struct HealthCommand {
     bitrate: Option<BitRate>,
 }
 
-/// The default duration.
-const DURATION: std::time::Duration = std::time::Duration::from_secs(10);
+/// The duration of a measurement on a live bus without `--for`.
+const DEFAULT_DURATION: std::time::Duration = std::time::Duration::from_secs(10);
 
 impl HealthCommand {
     /// The nodes that no other cangauge may use at the same time.
@@ -62,7 +62,7 @@ impl HealthCommand {
             let options = HealthOptions {
                 reads: reads && !nodes.is_empty(),
                 nodes,
-                duration: duration.or(is_live.then_some(DURATION)),
+                duration: duration.or(is_live.then_some(DEFAULT_DURATION)),
                 bit_rate: self.bitrate.map(|rate| rate.0),
                 overrides: descriptions::overrides(global, &described)?,
             };

@@ -1,8 +1,8 @@
-//! The journal: what must be undone if the program is killed, one file per bus and device in
-//! `$XDG_STATE_HOME/cangauge/`. It contains a temporary write, or the settings before `config apply`.
+//! The journal: files in `$XDG_STATE_HOME/cangauge/` with the changes to undo if the program is killed. A file contains
+//! one temporary write to a device, or the settings of a device before `config apply`.
 //!
 //! The file is written and synced before the first write to the device, and removed after success. The file of a
-//! temporary write is locked while its program runs. Without a lock it comes from a program that was killed.
+//! temporary write is locked while its program runs. A file without a lock was left by a killed program.
 
 use super::args::BusSpec;
 use crate::bus::file::lock;
@@ -17,24 +17,24 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// The first line of the file of a temporary write. Another version is ignored.
-const HEAD: &str = "cangauge journal 1";
+/// The first line of the file of a temporary write. Files with another version are ignored.
+const HEADER: &str = "cangauge journal 1";
 
 /// The extensions of the two kinds of files.
-const WRITE: &str = "undo";
-const SETTINGS: &str = "toml";
+const WRITE_EXTENSION: &str = "undo";
+const SETTINGS_EXTENSION: &str = "toml";
 
 /// The files of one bus.
 #[derive(Debug)]
 pub(super) struct FileJournal {
     folder: Option<PathBuf>,
     bus: String,
-    /// The temporary writes of this run, locked.
-    own: BTreeMap<PathBuf, File>,
+    /// The locked files of the temporary writes of this run.
+    locked: BTreeMap<PathBuf, File>,
 }
 
 impl FileJournal {
-    /// The temporary writes on a bus. Simulated devices and recordings need no journal.
+    /// Opens the journal of a bus. Simulated devices and recordings need no journal.
     pub(super) fn of(bus: &BusSpec) -> FileJournal {
         match bus {
             BusSpec::SocketCan(name) => FileJournal::in_folder(folder(), name),
@@ -44,35 +44,37 @@ impl FileJournal {
     }
 
     fn in_folder(folder: Option<PathBuf>, bus: &str) -> FileJournal {
-        FileJournal { folder, bus: bus.to_owned(), own: BTreeMap::new() }
+        FileJournal { folder, bus: bus.to_owned(), locked: BTreeMap::new() }
     }
 
-    /// The file of a device. A device without a serial number is known by its node-ID.
-    fn path(&self, node: NodeId, identity: [Option<u32>; 4], more: &str) -> Option<PathBuf> {
+    /// Returns the path of a file for a device. The node-ID replaces a missing serial number.
+    fn path(&self, node: NodeId, identity: [Option<u32>; 4], suffix: &str) -> Option<PathBuf> {
         let bus: String = self.bus.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         let [vendor, product, _, serial] = identity;
         let code = |number: Option<u32>| number.map_or_else(|| "-".to_owned(), |number| format!("{number:X}"));
         let device =
             serial.filter(|serial| *serial != 0).map_or_else(|| format!("node{node}"), |serial| serial.to_string());
-        Some(self.folder.as_ref()?.join(format!("{bus}_{}_{}_{device}{more}", code(vendor), code(product))))
+        Some(self.folder.as_ref()?.join(format!("{bus}_{}_{}_{device}{suffix}", code(vendor), code(product))))
     }
 
     fn path_of(&self, write: &TemporaryWrite) -> Option<PathBuf> {
-        let more = format!("_{}_{:04x}.{WRITE}", write.node, write.object.index);
-        self.path(write.node, write.identity, &more)
+        let suffix = format!("_{}_{:04x}.{WRITE_EXTENSION}", write.node, write.object.index);
+        self.path(write.node, write.identity, &suffix)
     }
 
-    /// The writes of killed programs on this bus, for these nodes.
+    /// Returns the temporary writes of killed programs on this bus, for the nodes in `is_ours`. Locks their files.
     pub(super) fn left_behind(&mut self, is_ours: &dyn Fn(NodeId) -> bool) -> Vec<TemporaryWrite> {
         let entries = self.folder.as_ref().and_then(|folder| fs::read_dir(folder).ok());
         let paths: Vec<PathBuf> = entries.into_iter().flatten().flatten().map(|entry| entry.path()).collect();
         let mut found = Vec::new();
-        for path in paths.into_iter().filter(|path| path.extension().is_some_and(|extension| extension == WRITE)) {
+        for path in
+            paths.into_iter().filter(|path| path.extension().is_some_and(|extension| extension == WRITE_EXTENSION))
+        {
             let Ok(text) = fs::read_to_string(&path) else { continue };
             let Some(write) = parse(&text, &self.bus).filter(|write| is_ours(write.node)) else { continue };
             let Ok(file) = File::options().append(true).open(&path) else { continue };
             if self.path_of(&write).as_ref() == Some(&path) && lock(&file).is_ok() {
-                self.own.insert(path, file);
+                self.locked.insert(path, file);
                 found.push(write);
             }
         }
@@ -85,7 +87,7 @@ impl Journal for FileJournal {
         let Some(path) = self.path_of(write) else { return Ok(()) };
         let file = write_synced(&path, text(write, &self.bus).as_bytes())
             .map_err(|error| JournalError { file: path.display().to_string(), reason: error.to_string() })?;
-        self.own.insert(path, file);
+        self.locked.insert(path, file);
         Ok(())
     }
 
@@ -93,7 +95,7 @@ impl Journal for FileJournal {
         if let Some(path) = self.path_of(write) {
             // If the file remains, the next run finds another value in the object, and writes nothing.
             let _ = fs::remove_file(&path);
-            self.own.remove(&path);
+            self.locked.remove(&path);
         }
     }
 }
@@ -108,8 +110,11 @@ pub(super) struct SettingsJournal<'a> {
 impl<'a> SettingsJournal<'a> {
     pub(super) fn new(bus: &str, snapshot: &Snapshot, console: &'a Console) -> SettingsJournal<'a> {
         let node = &snapshot.node;
-        let path =
-            FileJournal::in_folder(folder(), bus).path(node.id, node.identity.numbers(), &format!(".{SETTINGS}"));
+        let path = FileJournal::in_folder(folder(), bus).path(
+            node.id,
+            node.identity.numbers(),
+            &format!(".{SETTINGS_EXTENSION}"),
+        );
         SettingsJournal { node: node.id, path, console }
     }
 
@@ -135,7 +140,7 @@ impl config::Journal for SettingsJournal<'_> {
             return Ok(());
         }
         let mut text = Vec::new();
-        // If the program is killed now, no incomplete journal remains.
+        // The draft is renamed when it is complete, so a killed program leaves no incomplete journal.
         let draft = path.with_extension("draft");
         let written = write_toml(&before.dump(false), &mut text).and_then(|()| write_synced(&draft, &text));
         written.and_then(|_| fs::rename(&draft, path)).map(|()| sync_folder(path)).map_err(|error| {
@@ -177,7 +182,7 @@ fn sync_folder(path: &Path) {
     }
 }
 
-/// The folder for the state of programs (XDG base directories). `None` if the environment contains none.
+/// Returns the folder of the journal (XDG base directories). `None` if neither XDG_STATE_HOME nor HOME is set.
 fn folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;
@@ -188,7 +193,7 @@ fn text(write: &TemporaryWrite, bus: &str) -> String {
     let identity = write.identity.map(|number| number.map_or("-".to_owned(), |number| number.to_string()));
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     format!(
-        "{HEAD}\nbus {bus}\nnode {}\nidentity {}\nobject {}\nbefore {}\nwritten {}\nend\n",
+        "{HEADER}\nbus {bus}\nnode {}\nidentity {}\nobject {}\nbefore {}\nwritten {}\nend\n",
         write.node,
         identity.join(" "),
         write.object,
@@ -197,11 +202,11 @@ fn text(write: &TemporaryWrite, bus: &str) -> String {
     )
 }
 
-/// Reads a file of this bus. `None` also for an incomplete file, because its write was not sent.
+/// Parses a file of this bus. Returns `None` if the file is incomplete: its write was not sent.
 fn parse(text: &str, bus: &str) -> Option<TemporaryWrite> {
     let mut lines = text.lines();
     let mut line = |name: &str| lines.next()?.strip_prefix(name)?.strip_prefix(' ').map(str::to_owned);
-    let is_ours = line("cangauge")? == HEAD.strip_prefix("cangauge ")? && line("bus")? == bus;
+    let is_ours = line("cangauge")? == HEADER.strip_prefix("cangauge ")? && line("bus")? == bus;
     let node = NodeId::new(line("node")?.parse().ok()?).ok()?;
     let numbers = line("identity")?;
     let numbers: Vec<Option<u32>> = numbers.split(' ').map(|number| number.parse().ok()).collect();

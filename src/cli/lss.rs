@@ -130,6 +130,7 @@ impl LssCommand {
 /// The descriptions named by the user.
 struct NamedDescriptions {
     overrides: Overrides,
+    /// The description that was given without a node.
     given: Option<Arc<Model>>,
 }
 
@@ -137,9 +138,9 @@ impl NamedDescriptions {
     fn new(global: &Global) -> anyhow::Result<NamedDescriptions> {
         let all: Vec<NodeId> = NodeId::all().collect();
         let overrides = descriptions::overrides(global, &all)?;
-        let named: Vec<NodeId> = global.device.iter().chain(&global.eds).filter_map(|given| given.node).collect();
-        // A description without a node is an override for every node without its own description.
-        let given = overrides.iter().find(|(node, _)| !named.contains(node)).map(|(_, model)| Arc::clone(model));
+        let named_nodes: Vec<NodeId> = global.device.iter().chain(&global.eds).filter_map(|given| given.node).collect();
+        // A description without a node is the override of every node that is not named.
+        let given = overrides.iter().find(|(node, _)| !named_nodes.contains(node)).map(|(_, model)| Arc::clone(model));
         Ok(NamedDescriptions { overrides, given })
     }
 

@@ -199,7 +199,7 @@ pub struct Global {
     #[arg(skip)]
     pub(crate) claim: Claim,
 
-    /// Whether the command only reads. A description of another device is then only a warning.
+    /// Whether the command only reads. A description for another device then causes a warning and no error.
     #[arg(skip)]
     pub(crate) only_reads: bool,
 
@@ -207,7 +207,7 @@ pub struct Global {
     #[arg(skip)]
     pub(crate) listens_only: bool,
 
-    /// The reaction of the command if two devices have one node-ID.
+    /// The reaction of the command if two devices have the same node-ID.
     #[arg(skip)]
     pub(crate) on_two_devices: OnTwoDevices,
 
@@ -215,7 +215,7 @@ pub struct Global {
     #[arg(skip)]
     pub(crate) shows_states: bool,
 
-    /// Descriptions that are not yet compared with the devices of these nodes.
+    /// Descriptions, and the nodes whose devices must still be compared with them.
     #[arg(skip)]
     pub(crate) pending: RefCell<Option<(Vec<Named>, Vec<NodeId>)>>,
 }
@@ -260,7 +260,7 @@ macro_rules! commands {
             }
         }
 
-        /// Names of a command, and the function that adds its arguments. One command can be built without the others.
+        /// Names of a command, and the function that adds its arguments. Each command can be built without the others.
         const ARGUMENTS: &[(&[&str], Augment)] =
             &[$($(#[$condition])? (&[$name $(, $alias)*], <$arguments>::augment_args)),+];
     };
@@ -300,7 +300,7 @@ commands! {
     Completions(completions::Completions): "completions";
 }
 
-/// Whether a simulated bus is given by a file, not by a list of devices.
+/// Whether the text after `sim:` names a bench file, and not devices.
 fn is_bench_file(bench: &Option<String>) -> bool {
     bench.as_ref().is_some_and(|bench| bench.ends_with(".toml"))
 }
@@ -309,7 +309,7 @@ fn is_bench_file(bench: &Option<String>) -> bool {
 type Augment = fn(clap::Command) -> clap::Command;
 
 impl Global {
-    /// The output on stderr with these options.
+    /// Returns the console, which prints to stderr with these options.
     pub(crate) fn console(&self) -> Console {
         Console {
             quiet: self.quiet,
@@ -333,7 +333,7 @@ impl Global {
         }
     }
 
-    /// The time-outs; `timeout` is the default of the command.
+    /// Returns the time-out and the retries; `timeout` is the default of the command.
     pub(crate) fn timing(&self, timeout: std::time::Duration) -> Timing {
         Timing {
             timeout: self.timeout.map_or(timeout, |timeout| timeout.0),
@@ -354,7 +354,7 @@ impl Global {
         render(reports, self.format, &mut AutoStream::new(stdout, color).lock()).map_err(exit::stdout)
     }
 
-    /// Prints reports as JSON or CSV; for text, the output of `text`.
+    /// Prints reports as JSON or CSV. If the format is text, calls `text` instead.
     pub(crate) fn print_or<R: Report>(
         &self,
         reports: &[R],
@@ -371,7 +371,7 @@ impl Global {
         self.print_or(reports, |_| Ok(()))
     }
 
-    /// Prints reports if the format is JSON. For results of a failed command.
+    /// Prints the results of a failed command, if the format is JSON.
     pub(crate) fn print_json<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
         if self.format.is_json() { self.print(reports) } else { Ok(()) }
     }
@@ -413,7 +413,7 @@ impl Global {
         }
         let unknown = master.unknown_objects();
         let finished = bus.finish().or_fail();
-        // An unknown object can be the reason of a failure: without 1000h the types are also unknown.
+        // Printed before the failure, because an unknown object can be its cause: without 1000h, types are unknown.
         let note = |(&node, objects): (&NodeId, &Vec<_>)| output::failure::unknown_objects(node, objects);
         unknown.iter().map(note).for_each(|text| self.console().note(&text));
         let result = result?;

@@ -55,7 +55,7 @@ impl Monitor {
         Claim::Nothing
     }
 
-    /// The descriptions of the devices in a recording, which is read twice for this.
+    /// Identifies the devices in a recording file, which is read once more for this. Returns their descriptions.
     fn recognised(global: &Global) -> anyhow::Result<Overrides> {
         match &global.bus {
             Some(BusSpec::Replay(file)) if file != "-" => {
@@ -68,7 +68,7 @@ impl Monitor {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let (nodes, described) = match &self.nodes {
+        let (nodes, described_nodes) = match &self.nodes {
             Nodes::All => (Vec::new(), NodeId::all().collect()),
             Nodes::These(nodes) => (nodes.clone(), nodes.clone()),
         };
@@ -78,22 +78,22 @@ impl Monitor {
             all: self.all,
             duration: self.duration.map(|duration| duration.0),
             count: self.count,
-            overrides: descriptions::overrides(global, &described)?,
+            overrides: descriptions::overrides(global, &described_nodes)?,
             recognised: Monitor::recognised(global)?,
         };
         let mut rows = global.stream::<Entry>()?;
-        let mut failed = None;
+        let mut write_error = None;
         let report = global.with_master(|master| {
             let mut on_entry = |entry: &Entry| match rows.push(entry) {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(error) => {
-                    failed = Some(error);
+                    write_error = Some(error);
                     ControlFlow::Break(())
                 }
             };
             Ok(monitor(master, &options, &mut on_entry)?)
         })?;
-        if let Some(error) = failed {
+        if let Some(error) = write_error {
             return Err(stdout(error));
         }
         let console = global.console();

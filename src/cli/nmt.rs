@@ -162,7 +162,7 @@ impl Targets {
         Ok(several(reports.len(), failures)?)
     }
 
-    /// The nodes whose state can be confirmed. The broadcast is sent even if no node answers.
+    /// Returns the nodes whose state can be confirmed. The broadcast is sent even if no node answers.
     fn confirmable(&self, master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
         match &self.nodes {
             Nodes::These(nodes) => Ok(nodes.clone()),
@@ -170,7 +170,7 @@ impl Targets {
         }
     }
 
-    /// Why the command failed for a node. An unconfirmed state is a failure only with `--confirm`.
+    /// Returns the failure of the command for a node. An unconfirmed state is a failure only with `--confirm`.
     fn failure_of(&self, kind: NmtCommand, report: &StateReport, global: &Global) -> Option<Failure> {
         let wanted = kind.target();
         let cause = match report.state {
@@ -237,21 +237,21 @@ impl WatchArgs {
             Nodes::These(nodes) => (nodes.clone(), true),
         };
         let mut rows = global.stream::<StateEvent>()?;
-        let mut failed = None;
+        let mut write_error = None;
         global.with_master(|master| {
             let until = self.duration.map(|duration| master.now() + duration.0);
             let mut on_change = |event: &StateEvent| match rows.push(event) {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(error) => {
-                    failed = Some(error);
+                    write_error = Some(error);
                     ControlFlow::Break(())
                 }
             };
-            // A recording answers no request.
+            // Nodes in a recording do not answer requests.
             let ask = ask && master.bus().is_live();
             Ok(watch(master, &nodes, ask, until, &mut on_change).or_fail()?)
         })?;
-        failed.map_or(Ok(()), |error| Err(stdout(error)))
+        write_error.map_or(Ok(()), |error| Err(stdout(error)))
     }
 }
 

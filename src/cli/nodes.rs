@@ -94,7 +94,7 @@ pub(super) fn on_channels<T>(
 }
 
 impl<T> NodeResults<T> {
-    /// The results without their nodes, and the failures for the end of the command.
+    /// Returns the results without their nodes, and the failures for [`NodeResults::end`].
     pub(super) fn into_parts(self) -> (Vec<T>, NodeResults<T>) {
         let NodeResults { count, done, failures } = self;
         (done.into_iter().map(|(_, done)| done).collect(), NodeResults { count, done: Vec::new(), failures })

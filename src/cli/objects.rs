@@ -62,7 +62,7 @@ impl Objects {
         global.print(&facts.collect::<Vec<_>>())
     }
 
-    /// The description, and the remaining words.
+    /// Returns the description, and the objects or words to search for.
     fn model(&self, global: &Global) -> anyhow::Result<(Arc<Model>, Vec<String>)> {
         let queries = self.queries.clone();
         let node = self.node();

@@ -39,10 +39,10 @@ const TRACE_READER_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The bus given by the options, or else the only CAN interface that is up.
 pub(super) fn spec(global: &Global) -> anyhow::Result<BusSpec> {
-    let is_down = |error: &ErrorMessage| interfaces().iter().all(|(_, up)| !up).then(|| error.message.clone());
+    let down_reason = |error: &ErrorMessage| interfaces().iter().all(|(_, up)| !up).then(|| error.message.clone());
     match &global.bus {
         Some(bus) => Ok(bus.clone()),
-        None => Ok(within(global, || only(&interfaces()), is_down)??),
+        None => Ok(within(global, || choose_interface(&interfaces()), down_reason)??),
     }
 }
 
@@ -83,14 +83,14 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
     let bus: Box<dyn Bus> = match spec {
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
         BusSpec::Replay(spec) => Box::new(recording(global, spec)?),
-        BusSpec::SocketCan(name) => within(global, || socketcan(name, even_down), is_missing)?.or_fail()?,
+        BusSpec::SocketCan(name) => within(global, || socketcan(name, even_down), temporary_reason)?.or_fail()?,
         BusSpec::Remote(remote) => {
             let purpose = match (even_down, global.listens_only) {
                 (true, _) => Use::Configure,
                 (false, true) => Use::Listen,
                 (false, false) => Use::Normal,
             };
-            within(global, || remote.open(purpose), is_missing)?.map_err(interrupted)?
+            within(global, || remote.open(purpose), temporary_reason)?.map_err(interrupted)?
         }
     };
     let bus = traced(global, bus)?;
@@ -98,7 +98,7 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
     Ok(if channels.is_empty() { bus } else { Box::new(SdoChannels::new(bus, &channels)) })
 }
 
-/// The bus with a limit for the load of SDO transfers.
+/// Adds a limit for the load of SDO transfers to the bus.
 fn paced(global: &Global, bus: Box<dyn Bus>, channels: &[SdoChannel]) -> Box<dyn Bus> {
     if global.max_load.is_some() && bus.bit_rate().is_none() {
         global.console().note(&format!("the bit rate of {} is unknown: --max-load has no effect", bus.name()));
@@ -107,7 +107,7 @@ fn paced(global: &Global, bus: Box<dyn Bus>, channels: &[SdoChannel]) -> Box<dyn
     Box::new(Paced::new(bus, global.max_load.map(|load| load.0), ids))
 }
 
-/// The bus with a trace, if requested. The trace is opened after the bus: if the bus cannot be opened, an existing
+/// Adds a trace to the bus, if requested. The trace is opened after the bus: if the bus cannot be opened, an existing
 /// trace is not overwritten. No frame is missing in the trace, because nothing is sent before.
 pub(super) fn traced(global: &Global, bus: Box<dyn Bus>) -> anyhow::Result<Box<dyn Bus>> {
     let Some(path) = &global.trace else { return Ok(bus) };
@@ -179,14 +179,14 @@ fn interrupted(error: BusError) -> Failure {
     }
 }
 
-/// Why an interface cannot be opened yet.
-fn is_missing(error: &BusError) -> Option<String> {
+/// Returns the message of an error that may be temporary: the interface is missing or down, or the server unreachable.
+fn temporary_reason(error: &BusError) -> Option<String> {
     matches!(error, BusError::NoInterface(_) | BusError::Down(_) | BusError::Unreachable { .. })
         .then(|| error.to_string())
 }
 
-/// Repeats `attempt` within `--wait`, while `obstacle` returns a temporary reason. The inner result is that of the last
-/// attempt.
+/// Repeats `attempt` for the time of `--wait`, while `obstacle` returns the reason of a temporary error. Returns the
+/// result of the last attempt.
 ///
 /// # Errors
 /// Ctrl-C.
@@ -199,11 +199,11 @@ fn within<T, E>(
     let mut interrupts = None;
     loop {
         let result = attempt();
-        let Some(why) = result.as_ref().err().and_then(&obstacle).filter(|_| !left.is_zero()) else {
+        let Some(reason) = result.as_ref().err().and_then(&obstacle).filter(|_| !left.is_zero()) else {
             return Ok(result);
         };
         if interrupts.is_none() {
-            global.console().note(&format!("{why}; waiting up to {}", format_duration(left)));
+            global.console().note(&format!("{reason}; waiting up to {}", format_duration(left)));
             interrupts = Some(self::interrupts()?);
         }
         let pause = left.min(WAIT_INTERVAL);
@@ -219,7 +219,7 @@ pub(super) fn bench(spec: &str) -> anyhow::Result<Bench> {
     Bench::parse(spec).map_err(bench_error)
 }
 
-/// The error of a bench file, with its kind.
+/// Converts the error of a bench to a usage error or a file error.
 pub(super) fn bench_error(error: BenchError) -> anyhow::Error {
     match error {
         BenchError::Usage(message) => ErrorMessage::usage(message).into(),
@@ -255,8 +255,8 @@ pub(super) fn has_interface() -> bool {
     interfaces().iter().any(|(_, up)| *up)
 }
 
-/// The only one of these CAN interfaces that is up. If none is up: the only one.
-fn only(all: &[(String, bool)]) -> Result<BusSpec, ErrorMessage> {
+/// Chooses the only CAN interface that is up. If none is up and there is only one, chooses this one.
+fn choose_interface(all: &[(String, bool)]) -> Result<BusSpec, ErrorMessage> {
     let up: Vec<&String> = all.iter().filter(|(_, up)| *up).map(|(name, _)| name).collect();
     let (kind, words) = match (up.as_slice(), all) {
         ([only], _) => return Ok(BusSpec::SocketCan((*only).clone())),
@@ -275,7 +275,7 @@ fn only(all: &[(String, bool)]) -> Result<BusSpec, ErrorMessage> {
     Err(ErrorMessage::new(kind, format!("{words}: {}", list.join(", "))).hint(hint))
 }
 
-/// The nodes given by the user; for `all`, those found by [`all`].
+/// Returns the nodes given by the user; for `all`, the nodes found by [`all`].
 ///
 /// # Errors
 /// `all` finds no node; bus errors and Ctrl-C.
@@ -309,7 +309,7 @@ mod tests {
         let chosen = |all: &[(&str, bool)]| {
             let all: Vec<(String, bool)> = all.iter().map(|(name, up)| ((*name).to_owned(), *up)).collect();
             let name = |spec| if let BusSpec::SocketCan(name) = spec { name } else { panic!("an interface") };
-            only(&all).map(name).map_err(|error| (error.kind, error.message))
+            choose_interface(&all).map(name).map_err(|error| (error.kind, error.message))
         };
         assert_eq!(chosen(&[("can0", false), ("can1", true)]), Ok("can1".to_owned()));
         assert_eq!(chosen(&[("can0", false)]), Ok("can0".to_owned()), "opening it reports that it is down");
@@ -330,7 +330,7 @@ mod tests {
                 attempts += 1;
                 if attempts == attempt { Ok(()) } else { Err(error("can0".to_owned())) }
             };
-            let opened = within(&global, attempt, is_missing);
+            let opened = within(&global, attempt, temporary_reason);
             (opened.is_ok_and(|opened| opened.is_ok()), attempts)
         };
         assert_eq!(up_at(2, BusError::Down), (true, 2));

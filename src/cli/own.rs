@@ -10,10 +10,10 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The longest description that is read.
+/// The maximum size of a description file, in bytes.
 const MAX_FILE: u64 = 16 << 20;
 
-/// The folders, that of the user first.
+/// Returns the folders; the folder of the user is the first.
 fn folders() -> Vec<PathBuf> {
     let path = |name: &str| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let config = path("XDG_CONFIG_HOME").or_else(|| Some(path("HOME")?.join(".config")));
@@ -46,12 +46,12 @@ pub(super) fn load() -> Result<Vec<String>, ErrorMessage> {
     Ok(broken)
 }
 
-/// The file of a description of the user.
+/// Returns the file name of a user description.
 pub(super) fn file_of(model: &Model) -> &str {
     model.made_for.first().map_or("", |device| device.file.as_str())
 }
 
-/// The TOML files of a folder by name.
+/// Returns the TOML files of a folder, sorted by name.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();

@@ -110,7 +110,7 @@ fn transmission(text: &str) -> Result<Trigger, String> {
 }
 
 /// Parses a duration as a 16-bit number of `unit`s.
-fn units(text: &str, unit: std::time::Duration, form: &str) -> Result<u16, String> {
+fn duration_as_u16(text: &str, unit: std::time::Duration, form: &str) -> Result<u16, String> {
     let wrong = || match text.parse::<f64>() {
         Ok(_) => format!("\"{text}\" has no unit ({text}ms): it must be {form}"),
         Err(_) => format!("\"{text}\" is not {form}"),
@@ -125,11 +125,11 @@ fn units(text: &str, unit: std::time::Duration, form: &str) -> Result<u16, Strin
 }
 
 fn event_timer(text: &str) -> Result<u16, String> {
-    units(text, std::time::Duration::from_millis(1), "a duration in whole milliseconds (0ms to 65535ms)")
+    duration_as_u16(text, std::time::Duration::from_millis(1), "a duration in whole milliseconds (0ms to 65535ms)")
 }
 
 fn inhibit(text: &str) -> Result<u16, String> {
-    units(text, std::time::Duration::from_micros(100), "a duration in steps of 100us (0us to 6553500us)")
+    duration_as_u16(text, std::time::Duration::from_micros(100), "a duration in steps of 100us (0us to 6553500us)")
 }
 
 fn identifier(text: &str) -> Result<u16, String> {
@@ -213,9 +213,9 @@ impl MapArgs {
 impl WatchArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let console = global.console();
-        let (mut failed, mut node_failures) = (None, Vec::new());
+        let (mut write_error, mut node_failures) = (None, Vec::new());
         let mut rows = global.stream::<ReceivedTpdo>()?;
-        let (asked, result) = global.with_claims(|master, claims| {
+        let (node_count, result) = global.with_claims(|master, claims| {
             let nodes = match &self.nodes {
                 Nodes::All if !master.bus().is_live() => NodeId::all().collect(),
                 nodes => open::nodes(master, global, nodes)?,
@@ -224,7 +224,7 @@ impl WatchArgs {
             let is_live = master.bus().is_live();
             let mut claims = Some(std::mem::take(claims));
             let mut report = |event: &WatchEvent<'_>| {
-                // The mappings are read. From now on, the command only listens.
+                // The mappings have been read, and the command only listens from now on, so the nodes are unlocked.
                 claims.take();
                 match *event {
                     WatchEvent::Restarted(node) => {
@@ -249,7 +249,7 @@ impl WatchArgs {
                     WatchEvent::Tpdo { at, node, number, samples, sources } => {
                         let tpdo = ReceivedTpdo::new(at, node, number, samples, sources);
                         if let Err(error) = rows.push(&tpdo) {
-                            failed = Some(error);
+                            write_error = Some(error);
                             return ControlFlow::Break(());
                         }
                     }
@@ -259,11 +259,11 @@ impl WatchArgs {
             let duration = self.duration.map(|duration| duration.0);
             Ok((nodes.len(), watch(master, &nodes, &overrides, duration, &mut report)))
         })?;
-        if let Some(error) = failed {
+        if let Some(error) = write_error {
             return Err(stdout(error));
         }
         match result {
-            Ok(failures) => Ok(several(asked, failures)?),
+            Ok(failures) => Ok(several(node_count, failures)?),
             Err(failure) => {
                 node_failures.push(failure);
                 Ok(several(node_failures.len(), node_failures)?)
@@ -272,15 +272,15 @@ impl WatchArgs {
     }
 }
 
-/// Reports a TPDO of a wrong length, or at the end the number of such TPDOs.
+/// Reports a TPDO of a wrong length, or the number of these TPDOs at the end.
 fn print_wrong_length(console: &Console, event: &WatchEvent<'_>) {
     match *event {
         WatchEvent::WrongLength { node, number, mapped, length, is_used } => {
-            let use_of_it = match is_used {
+            let consequence = match is_used {
                 true => format!("its first {mapped} bytes are shown"),
                 false => format!("it is not shown; read by SDO instead: cangauge log {node} --poll 100ms"),
             };
-            console.warn(&format!("node {node}: {number} has {length} bytes, its mapping {mapped}: {use_of_it}"));
+            console.warn(&format!("node {node}: {number} has {length} bytes, its mapping {mapped}: {consequence}"));
         }
         WatchEvent::WrongLengths(node, 1) => console.note(&format!("node {node}: 1 TPDO of the wrong length")),
         WatchEvent::WrongLengths(node, count) => {

@@ -58,7 +58,7 @@ pub(crate) struct Plot {
     elapsed: bool,
 }
 
-/// The file of a plot.
+/// Parses the file name of a plot.
 fn picture(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match extension(&path).as_deref() {
@@ -106,7 +106,7 @@ impl FromStr for Moment {
 }
 
 impl Moment {
-    /// The time in a recording that starts at `first`. `None` if the recording has no times of day.
+    /// Converts to microseconds on the axis of a recording that starts at `first`. `None` if it has no clock times.
     fn resolve(self, first: i64, axis: TimeAxis) -> Option<i64> {
         const DAY: i64 = 86_400_000_000;
         match (self, axis) {
@@ -117,7 +117,7 @@ impl Moment {
             (Moment::OfDay(of_day), TimeAxis::Clock(zone)) => {
                 let start = first + zone(first);
                 let at = start.div_euclid(DAY) * DAY + of_day - zone(first);
-                // The minute of the first value is on the same day. An earlier minute is on the next day.
+                // The minute of the first value is on the first day. An earlier time of day is on the next day.
                 Some(if at + 60_000_000 > first { at } else { at + DAY })
             }
         }
@@ -212,14 +212,14 @@ fn is_chosen(wanted: &str, node: u8, signal: &str) -> bool {
     is_name(wanted) || wanted.strip_prefix(&format!("{node}.")).is_some_and(is_name)
 }
 
-/// The files for a name: itself, or the parts that `log --rotate` wrote.
+/// Returns the file itself if it exists, otherwise the parts that `log --rotate` wrote.
 fn parts(file: &Path) -> anyhow::Result<Vec<PathBuf>> {
     if file == Path::new("-") || file.exists() {
         return Ok(vec![file.to_owned()]);
     }
     let parts: Vec<PathBuf> =
         series::existing(file).unwrap_or_default().into_iter().map(|number| series::name(file, number)).collect();
-    // An absent file is an error when it is opened.
+    // If the file is missing, the error is reported when it is opened.
     Ok(if parts.is_empty() { vec![file.to_owned()] } else { parts })
 }
 
@@ -276,8 +276,9 @@ mod tests {
 
     #[test]
     fn signals_by_name_and_node() {
-        for (wanted, is_it) in [("pressure", true), ("5.Pressure", true), ("6.pressure", false), ("press", false)] {
-            assert_eq!(is_chosen(wanted, 5, "pressure"), is_it, "{wanted}");
+        for (wanted, is_expected) in [("pressure", true), ("5.Pressure", true), ("6.pressure", false), ("press", false)]
+        {
+            assert_eq!(is_chosen(wanted, 5, "pressure"), is_expected, "{wanted}");
         }
         assert!(is_chosen("pressure.status", 5, "pressure.status"));
     }

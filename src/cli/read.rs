@@ -47,37 +47,37 @@ impl Read {
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let wanted: Vec<Wanted> = self.signals.iter().map(|signal| signal.0.clone()).collect();
-        let (asked, results) = global.with_master(|master| {
+        let (node_count, results) = global.with_master(|master| {
             let nodes = open::nodes(master, global, &self.nodes)?;
             let overrides = descriptions::overrides_on(master, global, &nodes)?;
             let results = read(master, &nodes, &wanted, &overrides).or_fail()?;
             Ok((nodes.len(), results))
         })?;
-        let is_bare = asked == 1 && wanted.len() == 1;
+        let is_number_only = node_count == 1 && wanted.len() == 1;
         let (mut values, mut failures) = (Vec::new(), Vec::new());
         for result in results {
-            match result.and_then(|readings| self.convert(global, readings, is_bare)) {
+            match result.and_then(|readings| self.convert(global, readings, is_number_only)) {
                 Ok(converted) => values.extend(converted),
                 Err(failure) => failures.push(failure),
             }
         }
         // `all` means the nodes with the signal. The command fails if no node has the signal.
         if self.nodes == Nodes::All && !values.is_empty() {
-            let (without, failed): (Vec<_>, Vec<_>) =
+            let (without_signal, failed): (Vec<_>, Vec<_>) =
                 failures.into_iter().partition(|failure| failure.kind() == Kind::Usage);
             failures = failed;
-            without.iter().for_each(|failure| global.console().note(&ErrorMessage::from(failure).message));
+            without_signal.iter().for_each(|failure| global.console().note(&ErrorMessage::from(failure).message));
         }
-        let reports: Vec<ReadValue<'_>> = values.iter().map(|value| report(value, is_bare)).collect();
+        let reports: Vec<ReadValue<'_>> = values.iter().map(|value| report(value, is_number_only)).collect();
         global.print(&reports)?;
-        Ok(several(asked, failures)?)
+        Ok(several(node_count, failures)?)
     }
 
     /// Prints the warnings of the readings of one node, and converts the values.
-    fn convert(&self, global: &Global, readings: Readings, is_bare: bool) -> Result<Vec<Converted>, Failure> {
+    fn convert(&self, global: &Global, readings: Readings, is_number_only: bool) -> Result<Vec<Converted>, Failure> {
         for (target, sample) in &readings {
             if let Some(doubt) =
-                sample.doubt.filter(|doubt| !is_bare || !matches!(doubt, Doubt::UnknownType | Doubt::NotNumber))
+                sample.doubt.filter(|doubt| !is_number_only || !matches!(doubt, Doubt::UnknownType | Doubt::NotNumber))
             {
                 let (node, signal) = (target.source.node, &target.source.signal);
                 global.console().warn(&doubt::doubt(node, signal, doubt));
@@ -94,8 +94,8 @@ impl Read {
                 }
                 result => result?,
             };
-            // An empty line is not a number.
-            if is_bare && global.prints_text() && sample.value.is_none() {
+            // A script expects a number, so an empty line would be wrong.
+            if is_number_only && global.prints_text() && sample.value.is_none() {
                 return Err(no_value(&target, &sample));
             }
             Ok((target, sample, converted))
@@ -104,8 +104,8 @@ impl Read {
     }
 }
 
-fn report((target, sample, converted): &Converted, is_bare: bool) -> ReadValue<'_> {
-    let value = ReadValue::new(&target.source, sample, is_bare);
+fn report((target, sample, converted): &Converted, is_number_only: bool) -> ReadValue<'_> {
+    let value = ReadValue::new(&target.source, sample, is_number_only);
     match *converted {
         Some((converted, unit)) => value.converted(converted, unit),
         None => value,
@@ -119,10 +119,10 @@ fn kept_unit(target: &Target) -> String {
     format!("node {node}: {signal} is not converted ({unit})")
 }
 
-/// A reading, and its value in the requested unit, with this unit.
+/// A reading, and (if a unit is requested) its value in this unit.
 type Converted = (Target, Sample, Option<(Option<f64>, Unit)>);
 
-/// Why a reading has no value.
+/// Returns the failure for a reading without a value.
 fn no_value(target: &Target, sample: &Sample) -> Failure {
     let signal = target.source.signal.to_string();
     let cause = match sample.doubt {

@@ -34,7 +34,7 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
-    /// Listens for one node.
+    /// The command `scan --passive` for one node.
     pub(super) fn passive(node: NodeId) -> Scan {
         Scan { nodes: Nodes::These(vec![node]), passive: true }
     }

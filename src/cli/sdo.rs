@@ -216,7 +216,7 @@ impl ReadArgs {
 }
 
 impl WriteArgs {
-    /// The objects and values: `OBJECT VALUE`, or `OBJECT=VALUE` each.
+    /// Parses the objects and values: `OBJECT VALUE`, or several `OBJECT=VALUE`.
     fn pairs(&self) -> Result<Vec<(ObjectArg, String)>, ErrorMessage> {
         let usage = |message: String| ErrorMessage::usage(message);
         let parse = |text: &str| text.parse::<ObjectArg>().map_err(usage);
@@ -236,7 +236,7 @@ impl WriteArgs {
         }
     }
 
-    /// The bytes of `--input`.
+    /// Reads the bytes of the file or stream in `--input`.
     fn input(&self) -> Result<Option<Vec<u8>>, FileError> {
         let Some(path) = &self.input else { return Ok(None) };
         let what = format!("read {}", path.display());
@@ -258,7 +258,7 @@ impl WriteArgs {
                 ObjectArg::Name(name) => node.entry_by_name(name),
             };
             if let Some(data_type) = self.data_type.or(entry.as_ref().map(|entry| entry.data_type)) {
-                // A description that is not yet known may explain the word.
+                // The description of the device is still unknown here, and may define the word.
                 let may_be_word = |object: ObjectId| {
                     let is_open = !node.is_identified && object.index >= 0x2000;
                     is_open && value.starts_with(char::is_alphabetic)
@@ -282,10 +282,10 @@ impl WriteArgs {
         }
         global.with_master(|master| {
             master.listen_to(&[self.node]).or_fail()?;
-            let mut ready = Vec::new();
+            let mut encoded = Vec::new();
             for (object, value) in &pairs {
                 let at = resolve(&mut node, master, object)?;
-                ready.push(match &file {
+                encoded.push(match &file {
                     Some(bytes) => (at, bytes.clone(), DataType::Domain),
                     None => {
                         let (bytes, data_type) = encode(master, &mut node, at, self.data_type, value)?;
@@ -301,7 +301,7 @@ impl WriteArgs {
             let (mut progress, mut watch) = (|moved| bar.show_bytes(moved), |_: &_| {});
             let mut options =
                 WriteOptions { form, blocks: self.block.into(), ..WriteOptions::new(&mut progress, &mut watch) };
-            for (at, bytes, data_type) in ready {
+            for (at, bytes, data_type) in encoded {
                 let is_verifiable = self.verify && !is_signature(&bytes);
                 let verify = is_verifiable.then_some(data_type);
                 if let Written::ReadBack(received) = write(master, &node, at, &bytes, verify, &mut options)? {

@@ -60,7 +60,7 @@ impl Sim {
     }
 }
 
-/// Serves the devices as a bus to the clients of a server.
+/// Starts a server. Its clients reach the devices as if on a bus.
 fn serve(global: &Global, address: Address) -> anyhow::Result<Box<dyn Bus>> {
     if global.bus.is_some() {
         return Err(ErrorMessage::usage("--listen serves the devices in place of a bus: omit --bus").into());

@@ -62,7 +62,7 @@ impl Unit {
         end.end()
     }
 
-    /// A single word is a unit if it is the name of a unit, otherwise a signal.
+    /// Returns signal and unit. A single word is a unit if it is the name of a unit, otherwise a signal.
     fn words(&self) -> Result<(Option<&str>, Option<Code>), String> {
         match self.words.as_slice() {
             [] => Ok((None, None)),

@@ -81,9 +81,9 @@ pub(super) struct Apply {
 /// One device to configure.
 struct Job {
     node: NodeId,
-    /// The settings; `None` for those in the journal.
+    /// The settings file; `None` to use the settings in the journal.
     file: Option<File>,
-    /// The file, for messages.
+    /// The name of the file, for messages.
     label: String,
 }
 
@@ -107,7 +107,7 @@ fn check_before(document: &Document, file: &str) -> anyhow::Result<()> {
     }
 }
 
-/// The result for one node.
+/// The result for one node: the applied settings, or (--dry-run) the lines to write.
 enum Outcome {
     Applied(Box<Applied>),
     Lines(Vec<Line>, Vec<Note>),
@@ -131,7 +131,7 @@ impl Apply {
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let record = self.record.as_ref().map(|path| ReportFile::create(path, false, None)).transpose()?;
-        let (asked, (bus, time), (done, failures)) = match &self.table {
+        let (device_count, (bus, time), (done, failures)) = match &self.table {
             Some(table) if self.prompt => self.by_prompt(global, table)?,
             Some(table) => self.by_table(global, table)?,
             None => self.by_nodes(global)?,
@@ -152,7 +152,7 @@ impl Apply {
             file.write(if is_html { record.html() } else { record.json() }.as_bytes())?;
         }
         self.report(global, done)?;
-        Ok(several_each(asked, failures)?)
+        Ok(several_each(device_count, failures)?)
     }
 
     /// Configures the nodes named by the user.
@@ -178,7 +178,7 @@ impl Apply {
         })
     }
 
-    /// Reads the table, and the file with the values of each row.
+    /// Reads the table, and fills the settings file with the values of each row.
     fn table(&self, table: &Path) -> anyhow::Result<Table> {
         match self.words.as_slice() {
             [file] => Table::read(table, file, self.sets_address()),
@@ -200,30 +200,30 @@ impl Apply {
             let found = identify_each(master, &nodes, &overrides).or_fail()?;
             let found: Vec<Node> = found.into_iter().filter_map(Result::ok).collect();
             let (mut jobs, mut failures) = (Vec::new(), Failures::new());
-            let asked = rows.len();
+            let device_count = rows.len();
             for row in rows {
                 let [vendor, product, serial] = row.identity.map(Some);
                 let is_this = |node: &&Node| {
                     let identity = &node.identity;
                     (identity.vendor, identity.product, identity.serial) == (vendor, product, serial)
                 };
-                let own: Vec<NodeId> = found.iter().filter(is_this).map(|node| node.id).collect();
-                match own[..] {
+                let matching: Vec<NodeId> = found.iter().filter(is_this).map(|node| node.id).collect();
+                match matching[..] {
                     [node] => jobs.push(Job { node, file: Some(File::Settings(row.document)), label: row.label }),
                     _ => {
-                        let cause = ConfigFailure::NotOneDevice { serial: row.identity[2], nodes: own };
+                        let cause = ConfigFailure::NotOneDevice { serial: row.identity[2], nodes: matching };
                         failures.push(vec![Failure::general(cause)]);
                     }
                 }
             }
             let (done, failed) = self.work(global, master, jobs, &overrides);
             failures.extend(failed);
-            Ok((asked, ended(master), (done, failures)))
+            Ok((device_count, ended(master), (done, failures)))
         })
     }
 
-    /// Configures all devices at the same time. Addresses are set one after the other, because LSS reaches all devices.
-    /// A bus failure or Ctrl-C ends the work.
+    /// Configures all devices at the same time; with --address one after the other, because LSS reaches all devices.
+    /// Then a bus failure or Ctrl-C ends the work.
     fn work(&self, global: &Global, master: &mut Master<'_>, jobs: Vec<Job>, overrides: &Overrides) -> Results {
         let console = global.console();
         if jobs.len() > 1 && !self.address {
@@ -277,10 +277,10 @@ impl Apply {
         job: &Job,
         overrides: &Overrides,
     ) -> Result<Outcome, Vec<Failure>> {
-        let one = |failure: Failure| vec![failure];
+        let as_list = |failure: Failure| vec![failure];
         let node = job.node;
-        master.listen_to(&[node]).map_err(|error| one(error.into()))?;
-        let snapshot = read(master, node, overrides, job.file.as_ref()).map_err(one)?;
+        master.listen_to(&[node]).map_err(|error| as_list(error.into()))?;
+        let snapshot = read(master, node, overrides, job.file.as_ref()).map_err(as_list)?;
         let mut journal = SettingsJournal::new(master.bus().name(), &snapshot, console);
         let interrupted = journal.latest().and_then(|(file, text)| {
             let unreadable = || Failure::at(node, ConfigFailure::Journal { reason: file.clone() });
@@ -296,22 +296,22 @@ impl Apply {
                 (job.label.clone(), (document, found))
             }
             (None, interrupted) => {
-                let (file, document) = interrupted.map_err(one)?;
+                let (file, document) = interrupted.map_err(as_list)?;
                 (file, (document, Vec::new()))
             }
         };
         if let Some(File::Dcf(_)) = &job.file {
-            check_conditions(&document, &snapshot).map_err(one)?;
+            check_conditions(&document, &snapshot).map_err(as_list)?;
         }
         let settings: Result<FileSettings, _> = snapshot.check(&document);
         let settings = settings.map_err(|found| ConfigFailure::of_mistakes(&file, Some(node), found))?;
         let options = self.options();
         if self.dry_run {
-            check_device(&settings, &snapshot, self.with_calibration).map_err(one)?;
+            check_device(&settings, &snapshot, self.with_calibration).map_err(as_list)?;
             let (lines, notes) = lines(&settings, &snapshot, &options);
             return Ok(Outcome::Lines(lines, found.into_iter().chain(notes).collect()));
         }
-        let mut applied = apply(master, snapshot, &settings, &options, overrides, &mut journal).map_err(one)?;
+        let mut applied = apply(master, snapshot, &settings, &options, overrides, &mut journal).map_err(as_list)?;
         applied.notes.splice(..0, found);
         Ok(Outcome::Applied(Box::new(applied)))
     }
@@ -355,12 +355,12 @@ fn split(results: Vec<Result<Outcome, Vec<Failure>>>) -> Results {
     (done, failures)
 }
 
-/// Whether a failure also concerns the devices that follow.
+/// Whether a failure ends the work on all devices: the bus failed, or Ctrl-C.
 fn ends_all(failure: &Failure) -> bool {
     matches!(failure.kind(), Kind::Interrupted | Kind::Bus)
 }
 
-/// The name of the bus, and its time.
+/// Returns the name of the bus and the present time.
 fn ended(master: &mut Master<'_>) -> (String, Wall) {
     let bus = master.bus();
     (bus.name().to_owned(), bus.now().wall)

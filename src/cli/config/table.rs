@@ -1,5 +1,5 @@
-//! `config apply --table FILE.csv`: one row for each device, by its identity. The columns replace `{column}` in the
-//! file.
+//! `config apply --table FILE.csv`: one row for each device, with its identity. The cells of the row replace `{column}`
+//! in the settings file.
 
 use super::{document, mistakes};
 use crate::canopen::id::{NodeId, parse_u32};
@@ -20,7 +20,7 @@ pub(super) struct TableRow {
     pub(super) identity: [u32; 3],
     /// The node-ID.
     pub(super) node: Option<NodeId>,
-    /// The file with the values of the row.
+    /// The settings file with the values of the row.
     pub(super) document: Document,
     /// The file and the row, for messages: `mh4.toml (row 3 of forty.csv)`.
     pub(super) label: String,
@@ -29,7 +29,7 @@ pub(super) struct TableRow {
 /// The column that [`Table::write_result`] writes.
 const RESULT: &str = "result";
 
-/// The start of a result of a device that was set.
+/// The first word of a result if the device was set.
 pub(super) const OK: &str = "ok";
 
 /// A table with the devices of a series.
@@ -42,7 +42,7 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Reads a table and its file.
+    /// Reads the table, and fills the settings file `file` with the values of each row.
     pub(super) fn read(table: &Path, file: &str, with_address: bool) -> anyhow::Result<Table> {
         let name = table.display().to_string();
         let io = |source: std::io::Error| FileError { what: format!("read {name}"), source };
@@ -68,7 +68,7 @@ impl Table {
             };
             let cells: Cells =
                 columns.iter().map(String::as_str).zip(&record).filter(|(_, cell)| !cell.is_empty()).collect();
-            let (identity, node) = addressed(&cells, &rows, with_address).map_err(wrong)?;
+            let (identity, node) = identity_and_node(&cells, &rows, with_address).map_err(wrong)?;
             let label = format!("{file} (row {line} of {name})");
             let document = filled(&template, &|column| cells.get(column).map(|cell| (*cell).to_owned()));
             let mut document = document.map_err(|found| mistakes(&label, found))?;
@@ -87,13 +87,13 @@ impl Table {
         Ok(Table { rows, path: table.to_owned(), records })
     }
 
-    /// Whether a row has the result of a device that was set.
+    /// Whether the device of a row was set, according to the column "result".
     pub(super) fn is_done(&self, row: usize) -> bool {
         let column = self.records[0].iter().position(|column| column == RESULT);
         column.and_then(|column| self.records[row + 1].get(column)).is_some_and(|result| result.starts_with(OK))
     }
 
-    /// Writes the result of a row into the file, which is replaced by rename.
+    /// Writes the result of a row to the table file. A rename replaces the file, so it is never incomplete.
     pub(super) fn write_result(&mut self, row: usize, result: String) -> anyhow::Result<()> {
         let column = self.records[0].iter().position(|column| column == RESULT).unwrap_or_else(|| {
             self.records[0].push(RESULT.to_owned());
@@ -118,8 +118,12 @@ fn check_columns(columns: &[String]) -> Result<(), String> {
     }
 }
 
-/// The identity and the node-ID of a row. Both differ from those of the rows before.
-fn addressed(cells: &Cells<'_>, before: &[TableRow], with_address: bool) -> Result<([u32; 3], Option<NodeId>), String> {
+/// Returns the identity and the node-ID of a row. Fails if a row before has the same identity or node-ID.
+fn identity_and_node(
+    cells: &Cells<'_>,
+    before: &[TableRow],
+    with_address: bool,
+) -> Result<([u32; 3], Option<NodeId>), String> {
     let number = |column: &str| {
         let text = cells.get(column).copied().unwrap_or_default();
         parse_u32(text).ok_or_else(|| format!("{column}: \"{text}\" is not a number (71, 0x47)"))
@@ -161,7 +165,7 @@ fn replace(document: &mut Document, key: &str, value: Item) {
     }
 }
 
-/// The file with `{column}` replaced by the cells of a row.
+/// Returns the settings file with each `{column}` replaced by the cell of a row.
 fn filled(template: &Document, cell: &dyn Fn(&str) -> Option<String>) -> Result<Document, Vec<Mistake>> {
     let mut filled = template.clone();
     let mut mistakes = Vec::new();

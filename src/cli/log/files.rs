@@ -111,10 +111,10 @@ impl FromStr for Decimal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct RotationArg(Rotation);
 
-/// The shortest time of a file.
+/// The shortest time of `--rotate`.
 const MIN_FILE_TIME: Duration = Duration::from_secs(1);
 
-/// The smallest size of a file, in bytes.
+/// The smallest size of `--rotate`, in bytes.
 const MIN_FILE_SIZE: u64 = 1000;
 
 impl FromStr for RotationArg {
@@ -153,12 +153,12 @@ pub(super) struct OpenFiles {
     series: Option<Series>,
     /// The file of the run, if the rows go to a regular file.
     run: Option<ReportFile>,
-    /// The name from which the names of rotated files follow. With --force, further files may be older.
+    /// The name given by `--output`, if files are rotated. `None` with `--force`: existing files may be of older runs.
     rotated: Option<PathBuf>,
     setup: Setup,
     /// The number of bytes of the existing file that are kept.
     keep: u64,
-    /// The contents of the existing file of events.
+    /// The existing lines of the events file.
     existing_events: Option<ExistingLines>,
     /// The time that opening waited for readers of FIFOs.
     pub(super) waited: Duration,
@@ -179,8 +179,8 @@ impl Files {
                 "add --sync 100ms or --poll 100ms, or omit --layout wide",
             );
         }
-        let of_csv = self.delimiter.is_some() || self.decimal.is_some() || self.bom;
-        if !format.is_csv() && of_csv {
+        let has_csv_options = self.delimiter.is_some() || self.decimal.is_some() || self.bom;
+        if !format.is_csv() && has_csv_options {
             let hint = format!("omit --format {} or these options", format.name());
             return refuse("--delimiter, --decimal and --bom are for CSV", &hint);
         }
@@ -195,7 +195,7 @@ impl Files {
         let files = [&self.output, &self.events, &self.summary].into_iter().flatten();
         let files: Vec<&PathBuf> = files.filter(|path| path.as_path() != Path::new("-")).collect();
         for (at, path) in files.iter().enumerate() {
-            // Two links to one file are detected by its lock.
+            // Two paths of the same file are detected later, by the lock of the file.
             if files[..at].contains(path) {
                 return refuse(
                     &format!("{} is used for two outputs", path.display()),
@@ -297,7 +297,7 @@ impl Files {
         Ok(())
     }
 
-    /// Opens the file for events. `limit` is the time for all readers of FIFOs.
+    /// Opens the events file. `limit` is the longest wait for the readers of all FIFOs together.
     fn open_events(&self, opened: &mut OpenFiles, limit: Option<Duration>) -> anyhow::Result<()> {
         let Some(path) = &self.events else { return Ok(()) };
         let left = limit.map(|limit| limit.saturating_sub(opened.waited));
@@ -312,7 +312,7 @@ impl Files {
         Ok(())
     }
 
-    /// Opens the first file of a series.
+    /// Opens the first file of a rotated recording.
     fn open_first(&self, base: &Path, opened: &mut OpenFiles) -> anyhow::Result<()> {
         let numbers = series::existing(base)
             .map_err(|source| FileError { what: format!("create {}", series::name(base, 1).display()), source })?;
@@ -371,7 +371,7 @@ impl OpenFiles {
         Some(RunFile::new(file, run))
     }
 
-    /// The writer of the rows. If the bus does not wait for the program, a thread writes.
+    /// Returns the writer of the rows. A thread writes, unless the bus waits for the program (`waits`).
     pub(super) fn rows(&mut self, waits: bool) -> anyhow::Result<Rows> {
         let target = match &self.rows {
             Some(file) => file.target(self.keep)?,
@@ -380,7 +380,7 @@ impl OpenFiles {
         Ok(Rows::new(line_writer(target, self.series.take(), waits)?, self.setup.clone()))
     }
 
-    /// The writer of the events, if requested.
+    /// Returns the writer of the events, if requested.
     pub(super) fn events(&self, waits: bool) -> anyhow::Result<Option<Events>> {
         let Some(file) = &self.events else { return Ok(None) };
         let (dialect, kept) = (self.setup.dialect, self.existing_events.as_ref());
@@ -389,7 +389,7 @@ impl OpenFiles {
         Ok(Some(Events::new(writer, dialect, self.setup.time, kept.is_some())))
     }
 
-    /// The files of the rows; `None` for stdout.
+    /// Returns the names of the files with rows, as text. `None` for stdout.
     pub(super) fn written(&self) -> Option<String> {
         let first = self.rows.as_ref()?.path().display();
         let base = self.rotated.as_ref().map(|base| series::existing(base).unwrap_or_default());
@@ -401,7 +401,7 @@ impl OpenFiles {
         })
     }
 
-    /// The name of the file of the rows.
+    /// Returns the name of the file with rows, or "stdout".
     pub(super) fn rows_name(&self) -> String {
         self.rows.as_ref().map_or_else(|| "stdout".to_owned(), |file| file.path().display().to_string())
     }

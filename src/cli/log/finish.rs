@@ -14,7 +14,7 @@ use crate::tasks::log::{LogFailure, RecordingReport};
 use crate::tasks::{Failure, Kind};
 use std::io::{self, Write};
 
-/// The time that Ctrl-C waits for a blocked output, in tenths of a second.
+/// The longest wait for a blocked output after Ctrl-C, in tenths of a second.
 const FLUSH_TIMEOUT: u32 = 20;
 
 /// How writing ended.
@@ -115,10 +115,10 @@ impl Finished {
             unmet => (None, unmet),
         };
         let deleted = self.deleted.first().map(|file| LogFailure::FileDeleted { file: file.clone() });
-        let own = [self.ended_early(), self.too_slow(files), deleted, self.lost_nodes()];
+        let run_failures = [self.ended_early(), self.too_slow(files), deleted, self.lost_nodes()];
         let mut failures: Vec<Failure> = failed.into_iter().collect();
         failures.extend(self.report.two_devices.iter().chain(&self.report.replaced).cloned());
-        failures.extend(own.into_iter().flatten().map(Failure::general));
+        failures.extend(run_failures.into_iter().flatten().map(Failure::general));
         let nodes = self.report.failed.clone();
         let partial = (failures.is_empty() && !nodes.is_empty()).then_some(Kind::Partial);
         failures.extend(nodes.into_iter().chain(without_data));

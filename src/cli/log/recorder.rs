@@ -23,7 +23,7 @@ use std::time::Duration;
 /// The interval of checks for lost rows and changed columns.
 const CHECK_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Rows that could not be written.
+/// The output that could not be written, with its error.
 #[derive(Debug)]
 pub(super) enum Unwritten {
     Rows(io::Error),
@@ -38,7 +38,7 @@ pub(super) struct Recorder {
     pub(super) progress: Progress,
     pub(super) console: Console,
     pub(super) error: Option<Unwritten>,
-    /// The file of the run, until the first row.
+    /// The file of the run; `None` as soon as it is written, before the first row.
     pub(super) run: Option<RunFile>,
     /// The values and events for `--plot`.
     pub(super) plot: Option<Recording>,
@@ -46,12 +46,12 @@ pub(super) struct Recorder {
     pub(super) counts: LiveCounts,
     /// Frames that the kernel dropped.
     dropped: u64,
-    /// The name of the file of the rows.
+    /// The name of the file with rows.
     file: String,
     /// The nodes that no other cangauge may use until the recording runs.
     pub(super) claims: Option<Claims>,
     start: Option<Mono>,
-    checked: Option<Mono>,
+    last_check: Option<Mono>,
     lost: u64,
     /// The files that another program deleted.
     pub(super) deleted: Vec<String>,
@@ -80,7 +80,7 @@ impl Recorder {
             claims: None,
             file,
             start: None,
-            checked: None,
+            last_check: None,
             lost: 0,
             deleted: Vec::new(),
             is_losing: false,
@@ -117,7 +117,7 @@ impl Recorder {
             let known = samples.iter().filter_map(|sample| Some((sample, sources.get(sample.source)?)));
             known.for_each(|(sample, source)| plot.push(sample, source));
         }
-        // A program that follows the file finds the run as soon as it finds a row.
+        // The run is written before the first row, so a program that follows the file finds the run of each row.
         if let Some(first) = samples.first()
             && let Some(run) = self.run.take()
             && let Err(error) = run.write(first.at.wall)
@@ -133,7 +133,7 @@ impl Recorder {
         self.proceed(result)
     }
 
-    /// Changes of the files by other programs since the last call, as text.
+    /// Returns a text for each file that another program changed since the last call.
     pub(super) fn take_changes(&mut self) -> Vec<String> {
         let mut changes = self.rows.take_changes();
         changes.extend(self.events.as_mut().map(Events::take_changes).unwrap_or_default());
@@ -147,10 +147,10 @@ impl Recorder {
 
     /// Reports changed files and columns, and the start and end of lost rows.
     fn check_rows(&mut self, at: Stamp) {
-        if self.checked.is_some_and(|checked| at.mono.since(checked) < CHECK_INTERVAL) {
+        if self.last_check.is_some_and(|last| at.mono.since(last) < CHECK_INTERVAL) {
             return;
         }
-        self.checked = Some(at.mono);
+        self.last_check = Some(at.mono);
         if let Some(Err(error)) = self.events.as_mut().map(Events::write_header) {
             self.error.get_or_insert(Unwritten::Events(error));
         }
@@ -163,8 +163,8 @@ impl Recorder {
             self.warn("columns", text.to_owned(), at);
         }
         let lost = self.rows.overflowed();
-        let more = lost > std::mem::replace(&mut self.lost, lost);
-        match (self.is_losing, more) {
+        let has_more_lost = lost > std::mem::replace(&mut self.lost, lost);
+        match (self.is_losing, has_more_lost) {
             (false, true) => {
                 self.is_losing = true;
                 self.warn("rows-lost", "the output cannot keep up: rows are being lost".to_owned(), at);

@@ -1,4 +1,4 @@
-//! Writes the file of the run beside a recording.
+//! Writes the file of the run to the folder of the recording.
 
 use super::super::args::BusSpec;
 use super::super::file::ReportFile;
@@ -16,23 +16,23 @@ pub(super) struct RunFile {
     record: RunRecord,
 }
 
-/// The name of the file of the runs of a recording: `run.csv.run.json`. Rotated files share it.
+/// Returns the path of the run file of a recording: `run.csv.run.json`. Rotated files share one run file.
 pub(super) fn run_file_name(recording: &Path) -> PathBuf {
     let mut name = recording.file_name().map(OsString::from).unwrap_or_default();
     name.push(".run.json");
     recording.with_file_name(name)
 }
 
-/// A run that starts at `start`, without its file and its nodes.
+/// Creates the record of a run that starts at `start`. The caller adds the file and the nodes.
 pub(super) fn new_run(bus: &BusSpec, tags: &[(String, String)], start: Wall) -> RunRecord {
     let host = host_name();
-    let own = tags.iter().find(|(key, _)| key == "bench").map(|(_, bench)| bench.clone());
+    let bench_tag = tags.iter().find(|(key, _)| key == "bench").map(|(_, bench)| bench.clone());
     RunRecord {
         run: new_run_id(start),
         version: env!("CARGO_PKG_VERSION"),
         command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect(),
         bus: bus.to_string(),
-        bench: own.unwrap_or_else(|| format!("{host}-{}", bus.short_name())),
+        bench: bench_tag.unwrap_or_else(|| format!("{host}-{}", bus.short_name())),
         host,
         tags: tags.to_vec(),
         ..RunRecord::default()

@@ -174,7 +174,7 @@ impl Options {
     fn run(&self, global: &Global, target: &Target, all: &[Values]) -> anyhow::Result<()> {
         let named = NamedDescriptions::new(global)?;
         let (descriptions, via) = (named.get(), Via::from(self.via));
-        // With the options of the user, wrong values are rejected before the bus is opened.
+        // If the user named a description, unsupported values are rejected before the bus is opened.
         let model = match target {
             Target::Node(node) => descriptions.overrides.get(node),
             _ => descriptions.given,
@@ -186,7 +186,7 @@ impl Options {
                 .try_for_each(|rate| check_rate(&model.description, rate, via))?;
         }
         let mut failures = Vec::new();
-        let mut done = global.stream::<AssignReport>()?;
+        let mut reports = global.stream::<AssignReport>()?;
         global.with_master(|master| {
             for &Values { id, rate, retime } in all {
                 let (store, force) = (!self.no_store, self.force);
@@ -195,7 +195,7 @@ impl Options {
                     Ok(assigned) => {
                         let on_host = matches!(&global.bus, Some(BusSpec::SocketCan(_)) | None);
                         let interface = on_host.then(|| master.bus().name().to_owned());
-                        report(global, &AssignReport { assigned, interface }, &mut done)?;
+                        report(global, &AssignReport { assigned, interface }, &mut reports)?;
                     }
                     Err(failure) => {
                         failures.push(failure);
@@ -210,13 +210,13 @@ impl Options {
     }
 }
 
-/// Prints the result, and on stderr its evidence and the remaining steps.
+/// Prints the result to stdout, and its confirmation and notes to stderr.
 fn report(
     global: &Global,
     report: &AssignReport,
-    done: &mut Stream<AssignReport, std::io::Stdout>,
+    reports: &mut Stream<AssignReport, std::io::Stdout>,
 ) -> anyhow::Result<()> {
-    done.push(report).map_err(crate::cli::exit::stdout)?;
+    reports.push(report).map_err(crate::cli::exit::stdout)?;
     let console = global.console();
     if let Some(confirmation) = report.confirmation() {
         console.note(&confirmation);

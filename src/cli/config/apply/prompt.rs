@@ -25,8 +25,9 @@ struct Series<'a> {
     table: Table,
     typed: TypedLines,
     arrivals: Arrivals,
-    /// The results by row, and the failures of the last attempt.
+    /// The results of the devices that were set.
     done: Vec<Outcome>,
+    /// The failures of the last attempt, by row.
     failed: BTreeMap<usize, Vec<Failure>>,
 }
 
@@ -57,7 +58,7 @@ impl Apply {
                 failed: BTreeMap::new(),
             };
             let result = series.carry_out(master);
-            let asked = series.table.rows.len();
+            let device_count = series.table.rows.len();
             let mut failures: Vec<Vec<Failure>> = series.failed.into_values().collect();
             match result? {
                 Ok(End::Complete) => {}
@@ -65,13 +66,13 @@ impl Apply {
                     return Err(ErrorMessage::usage("the input ended before the first device").into());
                 }
                 Ok(End::Input) => {
-                    let serials = (0..asked).filter(|row| !series.table.is_done(*row));
+                    let serials = (0..device_count).filter(|row| !series.table.is_done(*row));
                     let serials = serials.map(|row| series.table.rows[row].identity[2]).collect();
                     failures.push(vec![Failure::general(ConfigFailure::NotPluggedIn { serials })]);
                 }
                 Err(failure) => failures.push(vec![failure]),
             }
-            Ok((asked, ended(master), (series.done, failures)))
+            Ok((device_count, ended(master), (series.done, failures)))
         })
     }
 }
@@ -82,7 +83,8 @@ fn is_unplugged(failure: &Failure) -> bool {
 }
 
 impl Series<'_> {
-    /// Outer errors: a file of this computer. Inner: the bus failed, or Ctrl-C.
+    /// Sets the devices until the table is complete or the input ends. The outer error is about a local file, the inner
+    /// error about the bus (or Ctrl-C).
     fn carry_out(&mut self, master: &mut Master<'_>) -> anyhow::Result<Result<End, Failure>> {
         loop {
             let left = (0..self.table.rows.len()).filter(|row| !self.table.is_done(*row)).count();
@@ -177,7 +179,7 @@ impl Series<'_> {
         Ok(Ok(()))
     }
 
-    /// Sets the device of a row. Without a node-ID it gets that of the row first.
+    /// Sets the device of a row. A device without a node-ID first gets the node-ID of the row.
     fn set(
         &mut self,
         master: &mut Master<'_>,
