@@ -49,22 +49,22 @@ impl Report for ZeroReport<'_> {
     }
 
     fn text(reports: &[Self], out: &mut dyn Write) -> io::Result<()> {
-        let rows: Vec<Vec<String>> = reports.iter().map(|report| words(report.node, report.zeroed)).collect();
+        let rows: Vec<Vec<String>> = reports.iter().map(|report| table_row(report.node, report.zeroed)).collect();
         super::table::write(out, &[super::table::Align::Left; 5], &rows)
     }
 }
 
 /// Half of the last decimal digit in the table.
-fn half(zeroed: &Zeroed) -> f64 {
+fn half_digit(zeroed: &Zeroed) -> f64 {
     i32::try_from(zeroed.decimals).map_or(0.0, |decimals| 0.5 * 10f64.powi(-decimals))
 }
 
-/// `1 pressure 0.013 -> 0.000 bar shift -0.013 bar offset 0.0 -> -0.013`; without shift and offset if nothing was
-/// changed.
-fn words(node: NodeId, zeroed: &Zeroed) -> Vec<String> {
+/// The cells of `1 pressure 0.013 -> 0.000 bar shift -0.013 bar offset 0.0 -> -0.013`. If nothing was changed, there is
+/// no shift and no new offset.
+fn table_row(node: NodeId, zeroed: &Zeroed) -> Vec<String> {
     // A number that rounds to zero is printed without a sign.
     let number =
-        |number: f64| format!("{:.*}", zeroed.decimals, if number.abs() < half(zeroed) { 0.0 } else { number });
+        |number: f64| format!("{:.*}", zeroed.decimals, if number.abs() < half_digit(zeroed) { 0.0 } else { number });
     let mean = |mean: Option<f64>| mean.map_or_else(|| "-".to_owned(), number);
     let with_unit = |text: String| format!("{text} {}", zeroed.unit).trim_end().to_owned();
     let mut row = vec![node.to_string(), zeroed.signal.clone()];

@@ -29,7 +29,7 @@ impl CheckProgress {
         CheckProgress { multi, lines: Vec::new(), total, color: has_color(color), duration }
     }
 
-    /// The display, so that other lines on stderr are printed above it.
+    /// Returns the display, so that other lines on stderr can be printed above it.
     pub fn multi(&self) -> MultiProgress {
         self.multi.clone()
     }
@@ -63,7 +63,7 @@ impl CheckProgress {
     /// Removes the lines. After Ctrl-C they stay: the terminal printed `^C`, so the cursor position is unknown.
     pub fn finish(&self, interrupted: bool) {
         if interrupted && !self.is_hidden() {
-            // If the terminal is closed, there is nothing left to do.
+            // If the terminal is closed, the error cannot be reported anywhere.
             let _ = writeln!(io::stderr());
         } else {
             let _ = self.multi.clear();

@@ -8,7 +8,7 @@ use crate::device::config_file::{Item, toml_key, toml_value};
 use crate::tasks::config::{Applied, ChangedRow, Dump, Line, Row, Step};
 use std::io::{self, Write};
 
-/// A value as a cell.
+/// Converts a value to a cell.
 fn value(item: &Item) -> Cell {
     match item {
         Item::Integer(number) => match (i64::try_from(*number), u64::try_from(*number)) {
@@ -45,7 +45,7 @@ impl Report for Row {
 /// Writes the settings as TOML with comments.
 ///
 /// # Errors
-/// Those of `out`.
+/// `out` cannot be written.
 pub fn write_toml(dump: &Dump, out: &mut dyn Write) -> io::Result<()> {
     let title = dump.title.as_deref().unwrap_or("a device without a description");
     writeln!(out, "# Settings of {}, written by cangauge config dump.", text::safe(title))?;
@@ -84,7 +84,7 @@ fn identity_comment(dump: &Dump, out: &mut dyn Write) -> io::Result<()> {
     if known.is_empty() { Ok(()) } else { writeln!(out, "# {}", known.join(", ")) }
 }
 
-/// The header of the table of a key, and the key in this table.
+/// Splits the key of a setting into the name of its TOML table and the key in this table.
 fn split(key: &str) -> (String, String) {
     let parts: Vec<&str> = key.split('.').collect();
     let depth = match parts.as_slice() {
@@ -261,5 +261,5 @@ impl Report for LineReport {
     }
 }
 
-/// The JSON Schema of a file, for editors.
+/// The JSON Schema of the settings file, for text editors.
 pub const SCHEMA: &str = include_str!("config.schema.json");

@@ -25,7 +25,7 @@ impl ConfigRecord<'_> {
         humantime::format_rfc3339_seconds(self.time.system_time()).to_string()
     }
 
-    /// One JSON object.
+    /// Returns the record as a JSON object.
     pub fn json(&self) -> String {
         let devices: Vec<Value> = self.done.iter().map(|applied| device(applied)).collect();
         let record = json!({
@@ -41,7 +41,7 @@ impl ConfigRecord<'_> {
         format!("{record:#}\n")
     }
 
-    /// One HTML page.
+    /// Returns the record as an HTML page.
     pub fn html(&self) -> String {
         let mut page = format!(
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Settings</title>\n<style>body{{font:11pt \

@@ -1,4 +1,4 @@
-//! stderr: errors, hints, warnings and notes.
+//! Prints errors, hints, warnings and notes to stderr.
 
 use super::failure::ErrorMessage;
 use super::plot::{Plot, terminal};
@@ -83,7 +83,7 @@ impl Console {
         if let Some(place) = &failure.place {
             let (shown, before) = text::around(&place.text, place.before.chars().count());
             let start: String = shown.chars().take(before).collect();
-            // Escaped characters need more space.
+            // Escaped characters are longer, so the mark `^` moves to the right.
             let before = text::safe(&start).chars().count();
             self.line(Style::new(), "  ", &shown);
             self.line(AnsiColor::Red.on_default().bold(), &format!("  {}^", " ".repeat(before)), "");

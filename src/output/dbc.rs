@@ -6,7 +6,7 @@ use crate::tasks::export::{Message, MessageSignal};
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 
-/// The longest name in a DBC file.
+/// The maximum length of a name in a DBC file.
 const MAX_NAME: usize = 32;
 
 /// Bit 31 of an identifier in a DBC file: set for a 29-bit identifier.
@@ -77,7 +77,7 @@ fn node_name(message: &Message) -> String {
     format!("Node{}", message.node)
 }
 
-/// The signals with their names: letters, digits and underscores, each name once.
+/// Returns the signals with unique names of letters, digits and underscores.
 fn named(message: &Message) -> Vec<(String, &MessageSignal)> {
     let mut taken = BTreeSet::new();
     let name = |signal: &MessageSignal| {
@@ -97,7 +97,7 @@ fn named(message: &Message) -> Vec<(String, &MessageSignal)> {
     message.signals.iter().map(name).collect::<Vec<_>>().into_iter().zip(&message.signals).collect()
 }
 
-/// A text between quotation marks.
+/// Converts a text so that it can stand between quotation marks.
 fn text(text: &str) -> String {
     text.chars().filter(|letter| !letter.is_control()).map(|letter| if letter == '"' { '\'' } else { letter }).collect()
 }

@@ -1,4 +1,4 @@
-//! The DCF of `config dump --dcf` (CiA 306), for other tools.
+//! Writes the DCF of `config dump --dcf` (CiA 306), for other tools.
 
 use super::text::safe;
 use crate::canopen::object::ObjectId;
@@ -11,7 +11,7 @@ use std::io::{self, Write};
 /// Writes the settings of a device.
 ///
 /// # Errors
-/// Those of `out`.
+/// `out` cannot be written.
 pub fn write_dcf(snapshot: &Snapshot, out: &mut dyn Write) -> io::Result<()> {
     let (node, objects) = (&snapshot.node, snapshot.dcf_objects());
     let identity = &node.identity;
@@ -30,9 +30,9 @@ pub fn write_dcf(snapshot: &Snapshot, out: &mut dyn Write) -> io::Result<()> {
     snapshot.bit_rate().map_or(Ok(()), |rate| writeln!(out, "Baudrate={}", rate / 1000))?;
     identity.serial.map_or(Ok(()), |serial| writeln!(out, "LSS_SerialNumber={serial}"))?;
     let indices: BTreeSet<u16> = objects.keys().map(|object| object.index).collect();
-    let is_own = |index: &&u16| (0x2000..0x6000).contains(*index);
-    let (own, others): (Vec<&u16>, Vec<&u16>) = indices.iter().partition(is_own);
-    for (section, list) in [("Mandatory", Vec::new()), ("Optional", others), ("Manufacturer", own)] {
+    let is_manufacturer = |index: &&u16| (0x2000..0x6000).contains(*index);
+    let (manufacturer, others): (Vec<&u16>, Vec<&u16>) = indices.iter().partition(is_manufacturer);
+    for (section, list) in [("Mandatory", Vec::new()), ("Optional", others), ("Manufacturer", manufacturer)] {
         writeln!(out, "\n[{section}Objects]\nSupportedObjects={}", list.len())?;
         (1..).zip(list).try_for_each(|(at, index)| writeln!(out, "{at}=0x{index:04X}"))?;
     }
@@ -60,7 +60,7 @@ pub fn write_dcf(snapshot: &Snapshot, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// A value in the form of CiA 306, with unsigned integers in hexadecimal.
+/// Formats a value as in CiA 306, with unsigned integers in hexadecimal.
 fn text(data_type: DataType, value: &Scalar) -> String {
     match value {
         Scalar::Integer(number) if matches!(data_type, DataType::Unsigned(_)) => format!("0x{number:X}"),

@@ -55,7 +55,7 @@ impl Report for Listed {
 /// A description as TOML.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DescriptionText {
-    /// Its name.
+    /// The name of the description.
     pub name: String,
     /// The contents of the file.
     pub toml: String,

@@ -8,7 +8,7 @@ use crate::node::state::Proof;
 use crate::tasks::diagnosis::{Running, Silence, SilenceCause, TpdoCause};
 use std::time::Duration;
 
-/// Why a node, or a signal of it, sends no measurements.
+/// Returns the reason why a node, or one of its signals, sends no measurements.
 pub fn reason(silence: &Silence) -> String {
     let text = match &silence.cause {
         SilenceCause::InterfaceDown => return "the interface is down".to_owned(),
@@ -49,7 +49,7 @@ pub fn reason(silence: &Silence) -> String {
     }
 }
 
-/// A word for the cause, for scripts.
+/// Returns a word for the cause, for scripts.
 pub fn word(silence: &Silence) -> &'static str {
     match &silence.cause {
         SilenceCause::InterfaceDown => "interface-down",
@@ -82,7 +82,7 @@ pub fn word(silence: &Silence) -> &'static str {
     }
 }
 
-/// Why a TPDO is not sent.
+/// Returns the reason why a TPDO is not sent.
 fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, silence: &Silence) -> String {
     let communication = number.communication(0).index;
     let mapping = number.mapping(0).index;
@@ -143,12 +143,12 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, silence: &Silence) -> Strin
     }
 }
 
-/// The length of TPDOs differs from their mapping.
+/// Returns the text for TPDOs whose length differs from their mapping.
 pub fn wrong_length(mapped: usize, received: usize) -> String {
     format!("its TPDOs have {received} bytes, but their mapping has {mapped}")
 }
 
-/// Why a TPDO cannot be decoded. `code` is 1Axxh:0, if it was read.
+/// Returns the reason why a TPDO cannot be decoded. `code` is 1Axxh:0, if it was read.
 pub fn not_decoded(number: TpdoNumber, code: Option<u8>) -> String {
     let mapping = number.mapping(0).index;
     match code {
@@ -189,7 +189,7 @@ fn or_not_running(running: Running) -> &'static str {
 /// The number of nodes listed with their reasons in a message.
 const MAX_LISTED: usize = 3;
 
-/// The reasons of the first nodes: `node 5: …; node 6: …`.
+/// Lists the reasons of the first nodes: `node 5: …; node 6: …`.
 pub fn reasons(nodes: &[(NodeId, Silence)]) -> String {
     let listed = nodes.iter().take(MAX_LISTED);
     let mut reasons: Vec<String> = listed.map(|(node, silence)| format!("node {node}: {}", reason(silence))).collect();
@@ -199,7 +199,7 @@ pub fn reasons(nodes: &[(NodeId, Silence)]) -> String {
     reasons.join("; ")
 }
 
-/// A command to type, or one thing to check. `log` is the beginning of the hint: `add`, or `cangauge log 5`.
+/// Returns a command to type, or one thing to check. `log` starts this command: `add`, or `cangauge log 5`.
 pub fn hint(silence: &Silence, node: NodeId, log: &str) -> Option<String> {
     let poll = || Some(format!("read by SDO instead: {log} --poll 100ms"));
     match &silence.cause {

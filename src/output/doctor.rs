@@ -24,13 +24,13 @@ pub struct FindingReport {
 }
 
 impl FindingReport {
-    /// The text of a finding. `interface` is the name of the bus.
+    /// Converts a finding to text. `interface` is the name of the bus.
     pub fn new(finding: &Finding, interface: &str) -> FindingReport {
         let (word, message, hint) = words(finding, interface);
         FindingReport { node: finding.node, signal: finding.signal.clone(), finding: word, message, hint }
     }
 
-    /// A bus that cannot be opened.
+    /// The finding for a bus that cannot be opened.
     pub fn of_bus(error: ErrorMessage) -> FindingReport {
         FindingReport { node: None, signal: None, finding: "bus", message: error.message, hint: error.hint }
     }
@@ -76,12 +76,12 @@ type Words = (&'static str, String, Option<String>);
 
 fn words(finding: &Finding, interface: &str) -> Words {
     let node = finding.node.map(|node| node.to_string()).unwrap_or_default();
-    let own = |text: String| text.strip_prefix(&format!("node {node}: ")).map(str::to_owned).unwrap_or(text);
+    let without_node = |text: String| text.strip_prefix(&format!("node {node}: ")).map(str::to_owned).unwrap_or(text);
     let errors = || Some(format!("cangauge errors {node}"));
     match &finding.cause {
         FindingCause::Failed(failure) => {
             let words = ErrorMessage::of(failure);
-            (super::failure::kind_name(words.kind), own(words.message), words.hint)
+            (super::failure::kind_name(words.kind), without_node(words.message), words.hint)
         }
         FindingCause::Silent(silence) => {
             let hint = finding.node.and_then(|node| diagnosis::hint(silence, node, &format!("cangauge log {node}")));
@@ -113,7 +113,7 @@ fn words(finding: &Finding, interface: &str) -> Words {
         }
         FindingCause::Remark(remark) => {
             let word = if matches!(remark, Remark::MayClip(..)) { "may-clip" } else { "doubt" };
-            (word, own(remark_text(remark)), None)
+            (word, without_node(remark_text(remark)), None)
         }
         FindingCause::NoFrame(_) | FindingCause::NoNode | FindingCause::Unconfigured | FindingCause::Fault(..) => {
             bus_words(&finding.cause, interface)

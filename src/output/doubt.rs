@@ -4,7 +4,7 @@ use crate::canopen::id::NodeId;
 use crate::measure::layout::NarrowValue;
 use crate::measure::sample::Doubt;
 
-/// Why the value of a signal is missing or may be wrong, with the remedy.
+/// Returns the reason why the value of a signal is missing or may be wrong, and the remedy.
 pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
     match doubt {
         Doubt::UnknownType => format!("node {node}: {}; {}", unknown_type(signal), type_remedy(node, signal)),
@@ -43,7 +43,7 @@ pub fn unknown_type(signal: &str) -> String {
     }
 }
 
-/// How to state the type of an object.
+/// Returns a hint that shows how to state the type of an object.
 pub fn type_remedy(node: NodeId, signal: &str) -> String {
     let object = signal.split_once('/').map_or(signal, |(object, _)| object);
     if object.starts_with("0x") {
@@ -53,7 +53,7 @@ pub fn type_remedy(node: NodeId, signal: &str) -> String {
     }
 }
 
-/// Why the values of a signal may be clipped, with the remedy.
+/// Returns the reason why the values of a signal may be clipped, and the remedy.
 pub fn may_clip(value: &NarrowValue) -> String {
     let unit = value.unit.map(|unit| format!(" {unit}")).unwrap_or_default();
     let range = value.range_end.map_or_else(

@@ -1,4 +1,4 @@
-//! A first description of a device as TOML, with comments about the missing parts.
+//! A draft description of a device as TOML, with comments about the missing parts.
 
 use super::sdo::is_usually_hexadecimal;
 use super::text::safe;
@@ -10,7 +10,7 @@ use crate::tasks::describe::{Draft, DraftObject};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-/// The description.
+/// Converts a draft description to TOML.
 pub fn toml(draft: &Draft) -> String {
     let node = &draft.node;
     let identity = &node.identity;
@@ -50,7 +50,7 @@ pub fn toml(draft: &Draft) -> String {
     text
 }
 
-/// A valid name that is not in use.
+/// Makes a valid name that is not in `used`, and adds it to `used`.
 fn unused_name(name: &str, fallback: &str, used: &mut BTreeSet<String>) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
     let words: String = name.chars().map(plain).collect();
@@ -114,7 +114,7 @@ fn signal_entry(draft: &Draft, signal: &Signal, names: &mut BTreeSet<String>) ->
 fn object_entry(draft: &Draft, found: &DraftObject, names: &mut BTreeSet<String>) -> String {
     let object = found.object;
     let fallback = object_name(object);
-    // Numbered objects share a name, so `at` is a range of sub-indices. A range adds the number to the name.
+    // Numbered objects share a name. Their `at` is a range of sub-indices, because only a range adds the number.
     let (at, name) = match &found.name {
         Some(name) if found.is_numbered && object.sub > 0 => {
             let plain = unused_name(name, &fallback, &mut BTreeSet::new());
@@ -179,14 +179,14 @@ fn is_mapping(object: ObjectId) -> bool {
     (0x1a00..0x1c00).contains(&object.index) && object.sub > 0
 }
 
-/// The lines as comments, with a note about completing them.
+/// Converts the lines to comments below a note that says what to fill in.
 fn commented(note: &str, lines: &[String]) -> String {
     let lines = lines.iter().flat_map(|line| line.lines().filter(|line| !line.is_empty()));
     let lines: Vec<String> = lines.map(|line| format!("# {line}")).collect();
     format!("\n# {note}\n{}", lines.join("\n"))
 }
 
-/// A value as TOML; `None` for bytes and times.
+/// Converts a value to TOML; `None` for bytes and times.
 fn literal(node: NodeId, object: ObjectId, value: &Value) -> Option<String> {
     let is_cob_id = object.index == 0x1014 || (0x1800..0x1a00).contains(&object.index) && object.sub == 1;
     match value {
@@ -206,7 +206,7 @@ fn literal(node: NodeId, object: ObjectId, value: &Value) -> Option<String> {
     }
 }
 
-/// A basic string of TOML.
+/// Converts a text to a TOML string in quotation marks.
 fn quoted(text: &str) -> String {
     let escaped = safe(text).replace('\\', "\\\\").replace('"', "\\\"");
     format!("\"{escaped}\"")

@@ -31,9 +31,9 @@ pub struct EventText {
     pub event: Option<&'static str>,
     /// The node of the event.
     pub node: Option<NodeId>,
-    /// One line.
+    /// The text, as one line.
     pub text: String,
-    /// How it is shown.
+    /// The importance, which decides how the event is shown.
     pub severity: Severity,
 }
 
@@ -61,12 +61,12 @@ pub struct Events {
     writer: LineWriter,
     dialect: Dialect,
     times: Times,
-    /// Whether the file already has its header; `None` after the first event.
+    /// Whether the file already has its header; `None` after [`Events::write_header`].
     header: Option<bool>,
 }
 
 impl Events {
-    /// Events for `writer`. With `continues` the file already has its header.
+    /// Writes events with `writer`. With `continues`, the file already has its header.
     pub fn new(writer: LineWriter, dialect: Dialect, time: TimeForm, continues: bool) -> Events {
         Events { writer, dialect, times: Times::new(time), header: Some(continues) }
     }
@@ -128,7 +128,7 @@ impl Events {
         self.writer.take_changes()
     }
 
-    /// Events that were lost.
+    /// The number of lost events.
     pub fn lost(&self) -> u64 {
         self.writer.lost()
     }

@@ -19,13 +19,13 @@ fn of_node(verdict: &Verdict) -> String {
     verdict.node.map(|node| format!(" node {node}")).unwrap_or_default()
 }
 
-/// Escapes the text of a workflow command; in a property also its separators.
+/// Escapes a text for a workflow command. In a property, the separators `:` and `,` are also escaped.
 fn escape(text: &str, is_property: bool) -> String {
     let text = text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A");
     if is_property { text.replace(':', "%3A").replace(',', "%2C") } else { text }
 }
 
-/// A table in Markdown.
+/// Returns the step summary: a table in Markdown.
 pub fn summary(report: &CheckReport) -> String {
     let mut text = String::from("### cangauge check\n\n| Result | Node | Expression | Measured |\n|---|---|---|---|\n");
     for verdict in &report.verdicts {

@@ -44,12 +44,12 @@ impl Report for Figure {
 
     /// The bus in a few lines, the nodes as a table, then the figures above their limits.
     fn text(figures: &[Figure], out: &mut dyn Write) -> io::Result<()> {
-        let shown = Shown(figures);
-        shown.bus(out)?;
+        let texts = FigureTexts(figures);
+        texts.bus(out)?;
         let nodes: BTreeSet<NodeId> = figures.iter().filter_map(|figure| figure.node).collect();
         if !nodes.is_empty() {
             let mut rows = vec![HEADINGS.map(str::to_owned).to_vec()];
-            rows.extend(nodes.iter().map(|&node| shown.row(node)));
+            rows.extend(nodes.iter().map(|&node| texts.row(node)));
             let (left, right) = (table::Align::Left, table::Align::Right);
             table::write(out, &[right, left, right, right, right, left, left, right, right], &rows)?;
         }
@@ -57,15 +57,15 @@ impl Report for Figure {
     }
 }
 
-/// The line for a figure above its limit.
+/// Returns the line for a figure above its limit; `None` for other figures.
 fn warning(figure: &Figure) -> Option<String> {
     let verdict = figure.verdict.filter(|verdict| !verdict.is_ok)?;
-    let of = figure.node.map_or_else(|| "bus".to_owned(), |node| format!("node {node}"));
+    let subject = figure.node.map_or_else(|| "bus".to_owned(), |node| format!("node {node}"));
     let detail = figure.detail.as_ref().map(|detail| format!(": {detail}")).unwrap_or_default();
     let value = figure
         .value
         .map(|value| format!(" {} (limit {})", amount(value, figure.unit), amount(verdict.limit, figure.unit)));
-    Some(format!("warning: {of}: {}{}{detail}", figure.name, value.unwrap_or_default()))
+    Some(format!("warning: {subject}: {}{}{detail}", figure.name, value.unwrap_or_default()))
 }
 
 /// `12.3 %`, `1.002 s`, `5`.
@@ -79,17 +79,17 @@ fn amount(value: f64, unit: &str) -> String {
     }
 }
 
-/// A time with about four digits.
+/// Rounds a time to about four digits.
 fn rounded(time: Duration) -> Duration {
     let step = if time >= Duration::from_secs(1) { 1000 } else { 10 };
     let microseconds = u64::try_from(time.as_micros()).unwrap_or(u64::MAX - step);
     Duration::from_micros((microseconds + step / 2) / step * step)
 }
 
-/// The figures by name.
-struct Shown<'a>(&'a [Figure]);
+/// Finds figures by node and name, and formats them.
+struct FigureTexts<'a>(&'a [Figure]);
 
-impl Shown<'_> {
+impl FigureTexts<'_> {
     fn figure(&self, node: Option<NodeId>, name: &str) -> Option<&Figure> {
         self.0.iter().find(|figure| figure.node == node && figure.name == name)
     }
@@ -108,8 +108,8 @@ impl Shown<'_> {
     }
 
     fn bus(&self, out: &mut dyn Write) -> io::Result<()> {
-        let of = |name: &str| self.or_dash(None, name);
-        writeln!(out, "frames      {} in {}, {}", of("bus.frames"), of("bus.duration"), of("bus.rate"))?;
+        let text_of = |name: &str| self.or_dash(None, name);
+        writeln!(out, "frames      {} in {}, {}", text_of("bus.frames"), text_of("bus.duration"), text_of("bus.rate"))?;
         let kinds = self.0.iter().filter_map(|figure| {
             let kind = figure.name.strip_prefix("bus.frames.").filter(|_| figure.node.is_none())?;
             Some(format!("{kind} {}", amount(figure.value?, "")))
@@ -118,40 +118,50 @@ impl Shown<'_> {
         match self.amount(None, "bus.load") {
             None => writeln!(out, "load        unknown: the bit rate is unknown (--bitrate)")?,
             Some(load) => {
-                let (now, peak, rate) = (of("bus.load.now"), of("bus.load.peak"), of("bus.bitrate"));
+                let (now, peak, rate) = (text_of("bus.load.now"), text_of("bus.load.peak"), text_of("bus.bitrate"));
                 writeln!(out, "load        mean {load}, now {now}, peak {peak} at {rate}")?;
-                let (frames, burst) = (of("bus.burst.frames"), of("bus.burst"));
+                let (frames, burst) = (text_of("bus.burst.frames"), text_of("bus.burst"));
                 writeln!(out, "burst       {frames} frames in {burst}")?;
             }
         }
         let errors = self.detail(None, "bus.errors").unwrap_or_else(|| "none".to_owned());
         writeln!(out, "errors      {errors}")?;
         if let Some(state) = self.detail(None, "bus.state") {
-            let (tx, rx) = (of("bus.tx-errors"), of("bus.rx-errors"));
+            let (tx, rx) = (text_of("bus.tx-errors"), text_of("bus.rx-errors"));
             writeln!(out, "controller  {state}, transmit errors {tx}, receive errors {rx}")?;
         }
         Ok(())
     }
 
     fn row(&self, node: NodeId) -> Vec<String> {
-        let of = |name: &str| self.or_dash(Some(node), name);
+        let text_of = |name: &str| self.or_dash(Some(node), name);
         let heartbeat = match self.amount(Some(node), "node.heartbeat.max") {
             None => "-".to_owned(),
             Some(max) => {
                 let wanted = self.amount(Some(node), "node.heartbeat.time").map(|time| format!(" (1017h: {time})"));
-                let (min, mean) = (of("node.heartbeat.min"), of("node.heartbeat.mean"));
+                let (min, mean) = (text_of("node.heartbeat.min"), text_of("node.heartbeat.mean"));
                 format!("{min} / {mean} / {max}{}", wanted.unwrap_or_default())
             }
         };
         let answer = match self.amount(Some(node), "node.sdo.max") {
             None => "-".to_owned(),
             Some(max) => {
-                let (min, mean, p99) = (of("node.sdo.min"), of("node.sdo.mean"), of("node.sdo.p99"));
-                format!("{min} / {mean} / {p99} / {max} ({})", of("node.sdo.count"))
+                let (min, mean, p99) = (text_of("node.sdo.min"), text_of("node.sdo.mean"), text_of("node.sdo.p99"));
+                format!("{min} / {mean} / {p99} / {max} ({})", text_of("node.sdo.count"))
             }
         };
         let state = self.detail(Some(node), "node.state").unwrap_or_else(|| "-".to_owned());
-        let (frames, rate, load) = (of("node.frames"), of("node.rate"), of("node.load"));
-        vec![node.to_string(), state, frames, rate, load, heartbeat, answer, of("node.emcy"), of("node.restarts")]
+        let (frames, rate, load) = (text_of("node.frames"), text_of("node.rate"), text_of("node.load"));
+        vec![
+            node.to_string(),
+            state,
+            frames,
+            rate,
+            load,
+            heartbeat,
+            answer,
+            text_of("node.emcy"),
+            text_of("node.restarts"),
+        ]
     }
 }

@@ -34,7 +34,7 @@ fn row(label: &str, text: impl Into<String>) -> Vec<String> {
     vec![label.to_owned(), text.into()]
 }
 
-/// The page as text.
+/// Writes the page as text.
 pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
     let described = info.node.model.as_ref().map(|model| &model.description);
     let title = described.map_or("unknown device", |description| description.title.as_str());
@@ -134,7 +134,7 @@ fn identity(info: &Info) -> Rows {
     rows
 }
 
-/// Error register and error history.
+/// Returns the rows for the error register, the error history and the error counters.
 pub fn errors(errors: &Errors) -> Vec<Vec<String>> {
     let mut rows: Rows = Vec::new();
     rows.extend(errors.register.map(|bits| row("register", format!("0x{bits:02X} {}", errors.register_text))));
@@ -235,7 +235,7 @@ fn mapped(info: &Info, object: String, bits: u8) -> String {
     name_of(info, &object).map_or_else(|| format!("{object}/{bits}"), |name| format!("{name} {object}/{bits}"))
 }
 
-/// The name of the signal whose value or status is in an object.
+/// Returns the name of the signal that has its value or status in an object, otherwise the name of the object.
 pub(super) fn name_of(info: &Info, object: &str) -> Option<String> {
     let of_signal = info.node.signals.iter().find_map(|signal| {
         let mut values = info.node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);
@@ -283,7 +283,7 @@ fn store(info: &Info) -> Rows {
     rows
 }
 
-/// Names separated by commas, in lines that fit the page.
+/// Joins names with commas, in lines that fit the page.
 fn wrapped(names: &[String]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for name in names {

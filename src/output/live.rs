@@ -10,19 +10,19 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 /// The time of one character of a sparkline.
-const PART: Duration = Duration::from_secs(3);
+const CHARACTER_TIME: Duration = Duration::from_secs(3);
 
-/// The characters of a sparkline: a minute.
-const PARTS: usize = 20;
+/// The number of characters of a sparkline, which shows one minute.
+const CHARACTERS: usize = 20;
 
-/// From the lowest to the highest value.
+/// The characters of a sparkline, from the lowest to the highest value.
 const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 /// If a node has more signals than this, each line shows this number of its signals. On a narrow terminal, half or a
 /// quarter of this number is used.
 const SIGNALS_IN_LINE: usize = 8;
 
-/// What is known about a running recording.
+/// The times and counts of a running recording.
 #[derive(Clone, Debug, Default)]
 pub struct LiveCounts {
     /// The time since the first tick.
@@ -55,7 +55,7 @@ struct LiveSignal {
     value: Option<Number>,
     status: Option<Status>,
     intervals: IntervalTracker,
-    /// The part of the time line, the sum and the number of its values.
+    /// For each character of the sparkline: its time index, and the sum and the number of its values.
     history: VecDeque<(u64, f64, u32)>,
 }
 
@@ -73,9 +73,9 @@ impl LiveSignal {
         format!("{rate}/s")
     }
 
-    /// The mean values of the last minute.
+    /// Draws the mean values of the last minute.
     fn sparkline(&self, now: Mono) -> String {
-        let last = part(now);
+        let last = time_index(now);
         let means = self.history.iter().map(|(_, sum, count)| sum / f64::from(*count));
         let (low, high) =
             means.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| (low.min(mean), high.max(mean)));
@@ -84,16 +84,16 @@ impl LiveSignal {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             share => LEVELS[((share * 8.0) as usize).min(7)],
         };
-        let at = |part: u64| {
-            let found = self.history.iter().find(|(known, ..)| *known == part);
+        let at = |index: u64| {
+            let found = self.history.iter().find(|(known, ..)| *known == index);
             found.map_or(' ', |(_, sum, count)| level(sum / f64::from(*count)))
         };
-        (0..PARTS as u64).rev().map(|back| last.checked_sub(back).map_or(' ', at)).collect()
+        (0..CHARACTERS as u64).rev().map(|back| last.checked_sub(back).map_or(' ', at)).collect()
     }
 }
 
-fn part(at: Mono) -> u64 {
-    u64::try_from(at.since_start().as_millis() / PART.as_millis()).unwrap_or(u64::MAX)
+fn time_index(at: Mono) -> u64 {
+    u64::try_from(at.since_start().as_millis() / CHARACTER_TIME.as_millis()).unwrap_or(u64::MAX)
 }
 
 /// The text and the style of a status.
@@ -110,7 +110,7 @@ fn status(status: Option<Status>) -> (&'static str, Style) {
 #[derive(Debug, Default)]
 pub(super) struct LiveTable {
     signals: Vec<LiveSignal>,
-    /// The place of the signal of each source.
+    /// For each source, the index of its signal in `signals`.
     places: Vec<Option<usize>>,
 }
 
@@ -120,17 +120,17 @@ impl LiveTable {
         if self.places.len() <= sample.source {
             self.places.resize(sample.source + 1, None);
         }
-        let place = *self.places[sample.source].get_or_insert_with(|| place(&mut self.signals, source));
+        let place = *self.places[sample.source].get_or_insert_with(|| add_signal(&mut self.signals, source));
         let signal = &mut self.signals[place];
         (signal.value, signal.status) = (sample.value, sample.status);
         signal.intervals.add(sample.at.mono, None);
         let Some(value) = sample.value.map(Number::as_f64).filter(|value| value.is_finite()) else { return };
-        let part = part(sample.at.mono);
-        match signal.history.back_mut().filter(|last| last.0 == part) {
+        let index = time_index(sample.at.mono);
+        match signal.history.back_mut().filter(|last| last.0 == index) {
             Some((_, sum, count)) => (*sum, *count) = (*sum + value, *count + 1),
-            None => signal.history.push_back((part, value, 1)),
+            None => signal.history.push_back((index, value, 1)),
         }
-        if signal.history.len() > PARTS {
+        if signal.history.len() > CHARACTERS {
             signal.history.pop_front();
         }
     }
@@ -140,10 +140,10 @@ impl LiveTable {
         let mut lines = vec![status_line(counts)];
         lines.extend(self.table(now, width));
         // The last line of the terminal stays free.
-        let most = height.saturating_sub(1).max(1);
-        if lines.len() > most {
-            let omitted = lines.len() - most + 1;
-            lines.truncate(most - 1);
+        let max_lines = height.saturating_sub(1).max(1);
+        if lines.len() > max_lines {
+            let omitted = lines.len() - max_lines + 1;
+            lines.truncate(max_lines - 1);
             lines.push(vec![(format!("{omitted} more lines"), Style::new().dimmed())]);
         }
         let text = |line: Line| cut(line, width.saturating_sub(1), color);
@@ -154,11 +154,12 @@ impl LiveTable {
         let mut nodes: Vec<u8> = self.signals.iter().map(|signal| signal.node).collect();
         nodes.sort_unstable();
         nodes.dedup();
-        let of = |node: u8| self.signals.iter().filter(move |signal| signal.node == node);
-        let (many, few): (Vec<u8>, Vec<u8>) = nodes.into_iter().partition(|&node| of(node).count() > SIGNALS_IN_LINE);
-        let mut lines = rows(&few.into_iter().flat_map(of).collect::<Vec<_>>(), now, width);
+        let signals_of = |node: u8| self.signals.iter().filter(move |signal| signal.node == node);
+        let (many, few): (Vec<u8>, Vec<u8>) =
+            nodes.into_iter().partition(|&node| signals_of(node).count() > SIGNALS_IN_LINE);
+        let mut lines = rows(&few.into_iter().flat_map(signals_of).collect::<Vec<_>>(), now, width);
         for node in many {
-            let signals: Vec<&LiveSignal> = of(node).collect();
+            let signals: Vec<&LiveSignal> = signals_of(node).collect();
             let mut in_line = SIGNALS_IN_LINE;
             let is_wide = |in_line| compact(&signals, now, in_line).iter().any(|line| length(line) >= width);
             while in_line > 2 && is_wide(in_line) {
@@ -170,8 +171,8 @@ impl LiveTable {
     }
 }
 
-/// The place of a signal. A signal in another unit replaces the old entry.
-fn place(signals: &mut Vec<LiveSignal>, source: &Source) -> usize {
+/// Adds the signal of a source, and returns its index. A signal in another unit replaces the old entry.
+fn add_signal(signals: &mut Vec<LiveSignal>, source: &Source) -> usize {
     let new = LiveSignal {
         node: source.node.get(),
         name: safe(&source.signal),
@@ -193,7 +194,7 @@ fn place(signals: &mut Vec<LiveSignal>, source: &Source) -> usize {
     }
 }
 
-/// One line for each signal, below a heading. Without room, the sparkline is omitted.
+/// Returns one line for each signal, below a heading. If the width is too small, the sparkline is omitted.
 fn rows(signals: &[&LiveSignal], now: Mono, width: usize) -> Vec<Line> {
     if signals.is_empty() {
         return Vec::new();
@@ -241,7 +242,7 @@ fn rows(signals: &[&LiveSignal], now: Mono, width: usize) -> Vec<Line> {
     std::iter::once(head).chain(signals.iter().enumerate().map(row)).collect()
 }
 
-/// Some signals of one node in each line: `3  ch1-ch8  20.1  20.4 …  degC  ok  10.0/s`.
+/// Returns lines with up to `in_line` signals of one node: `3  ch1-ch8  20.1  20.4 …  degC  ok  10.0/s`.
 fn compact(signals: &[&LiveSignal], now: Mono, in_line: usize) -> Vec<Line> {
     let mut values: Vec<String> = signals.iter().map(|signal| signal.value()).collect();
     align_decimals(&mut values);
@@ -278,7 +279,7 @@ fn compact(signals: &[&LiveSignal], now: Mono, in_line: usize) -> Vec<Line> {
     lines
 }
 
-/// The times, the number of rows, and the losses, in red if not 0.
+/// The times and the number of rows; the numbers of lost rows and of gaps are red if they are not 0.
 fn status_line(counts: &LiveCounts) -> Line {
     let plain = |text: String| (text, Style::new());
     let clock = |time: Duration| {
@@ -335,7 +336,7 @@ mod tests {
     use crate::canopen::id::NodeId;
     use crate::measure::sample::Raw;
 
-    /// Values of a second, ten times for each signal, of nodes with this many signals.
+    /// Makes a table with ten values of each signal in one second. `signals`: nodes, and the number of their signals.
     fn table(signals: &[(u8, usize)]) -> LiveTable {
         let mut table = LiveTable::default();
         let mut number = 0;

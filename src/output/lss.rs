@@ -147,9 +147,9 @@ impl Report for AssignReport {
     /// The new node-ID and bit rate: `12 500000`.
     fn text(reports: &[Self], out: &mut dyn Write) -> io::Result<()> {
         for AssignReport { assigned, .. } in reports {
-            let bare = |rate: PlannedRate| rate.bits.map_or_else(|| self::rate(rate), |bits| bits.to_string());
+            let plain_rate = |rate: PlannedRate| rate.bits.map_or_else(|| self::rate(rate), |bits| bits.to_string());
             let node = assigned.new.map(|new| new.to_string());
-            let parts: Vec<String> = node.into_iter().chain(assigned.rate.map(bare)).collect();
+            let parts: Vec<String> = node.into_iter().chain(assigned.rate.map(plain_rate)).collect();
             writeln!(out, "{}", parts.join(" "))?;
         }
         Ok(())
@@ -161,7 +161,7 @@ impl Report for AssignReport {
 }
 
 impl AssignReport {
-    /// The evidence for the node-ID, and the identifiers of the TPDOs.
+    /// Returns the evidence for the new node-ID, and the COB-IDs of the TPDOs.
     pub fn confirmation(&self) -> Option<String> {
         let (new, ids) = (self.assigned.new?, self.assigned.cob_ids.as_ref()?);
         let boot_up = match self.assigned.boot_time {
@@ -174,7 +174,7 @@ impl AssignReport {
         Some(std::iter::once(boot_up).chain(tpdos).collect::<Vec<_>>().join("; "))
     }
 
-    /// The remaining steps.
+    /// Returns the notes about the remaining steps.
     pub fn notes(&self) -> Vec<NoteText> {
         let assigned = &self.assigned;
         let mut notes = Vec::new();
@@ -317,7 +317,7 @@ pub(super) fn progress(progress: &Progress) -> String {
     id.into_iter().chain(rate).chain([stored.to_owned()]).collect::<Vec<_>>().join(", ")
 }
 
-/// The evidence of more than one device on the bus.
+/// Describes the evidence that more than one device is on the bus.
 pub(super) fn another(sign: &AnotherSlave) -> String {
     let several = |what: String| format!("more than one LSS slave answers ({what})");
     match sign {
@@ -334,7 +334,7 @@ pub(super) fn another(sign: &AnotherSlave) -> String {
     }
 }
 
-/// The evidence of two devices with one node-ID.
+/// Describes the evidence that two devices have the same node-ID.
 pub(super) fn duplicate(sign: DuplicateSign) -> &'static str {
     match sign {
         DuplicateSign::OtherMaster => "another master sends requests to it",

@@ -239,7 +239,7 @@ fn unit(message: &SdoMessage) -> Option<&str> {
     message.unit.as_deref().or(measured)
 }
 
-/// The number in a message, if there is one.
+/// Returns the value in a message as a cell, empty if there is none.
 fn value(content: &Content) -> Cell {
     match content {
         Content::State(state) | Content::Guarded(state, _) => state.to_string().into(),

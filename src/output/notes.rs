@@ -20,7 +20,7 @@ use serde::Serialize;
 pub struct NoteText {
     /// The code for scripts.
     pub code: &'static str,
-    /// One line, without the node in front.
+    /// The text in one line, without the node in front.
     pub message: String,
     /// A command to type.
     pub command: Option<String>,
@@ -42,7 +42,7 @@ impl NoteText {
         self
     }
 
-    /// The text as a cell of a report, for a list of notes.
+    /// Converts to a cell, for a list of notes in a report.
     pub(super) fn cell(&self) -> Cell {
         Cell::Object(vec![
             ("code", self.code.into()),
@@ -130,8 +130,8 @@ fn rule_text(node: &str, rule: &Rule) -> NoteText {
         return NoteText::new("not-allowed", format!("{object} accepts {}{unit}{page}", objects::allowed(entry)));
     }
     let others: Vec<String> = entry.only_if_zero.iter().map(ToString::to_string).collect();
-    let are = if others.len() == 1 { "is" } else { "are" };
-    let message = format!("{object} can be set only while {} {are} 0{page}", others.join(" and "));
+    let verb = if others.len() == 1 { "is" } else { "are" };
+    let message = format!("{object} can be set only while {} {verb} 0{page}", others.join(" and "));
     let zeros: Vec<String> = entry.only_if_zero.iter().map(|other| format!("{other}=0")).collect();
     NoteText::new("only-if-zero", message)
         .command("switch the other off first", format!("cangauge sdo write {node} {}", zeros.join(" ")))
@@ -161,7 +161,7 @@ pub fn notes(notes: &[Note]) -> Vec<NoteText> {
     notes.iter().map(note).collect()
 }
 
-/// The notes of a report as a cell: one object each.
+/// Converts the notes of a report to a cell: a list with one object for each note.
 pub(super) fn cell(notes: &[Note]) -> Cell {
     Cell::List(notes.iter().map(|note| self::note(note).cell()).collect())
 }
@@ -173,7 +173,7 @@ pub fn print(console: &Console, note: &Note) {
     if note.fact.is_warning() { console.warn(&line) } else { console.note(&line) }
 }
 
-/// The text for a temporary write of an earlier run.
+/// The warning about a temporary write that an earlier run left behind.
 pub fn undone_text(write: &TemporaryWrite, undone: Undone) -> String {
     let TemporaryWrite { node, object, .. } = write;
     let [before, written] = [&write.before, &write.written].map(|bytes| value_text(bytes));

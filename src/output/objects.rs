@@ -27,7 +27,7 @@ impl<'a> ObjectFacts<'a> {
         self.model.description.object(self.entry.object)
     }
 
-    fn of<'t>(&self, text: fn(&'a ObjectEntry) -> &'t str) -> &'t str
+    fn text_of<'t>(&self, text: fn(&'a ObjectEntry) -> &'t str) -> &'t str
     where
         'a: 't,
     {
@@ -63,7 +63,7 @@ impl<'a> ObjectFacts<'a> {
         }
     }
 
-    /// The values and ranges that the object accepts, if they are not one range.
+    /// The values and ranges that the object accepts; empty if it accepts a single range.
     fn allowed(&self) -> Vec<String> {
         self.described().map(ranges).unwrap_or_default()
     }
@@ -80,7 +80,7 @@ impl<'a> ObjectFacts<'a> {
         values.map(|(value, meaning)| format!("{} {meaning}", number(*value))).collect()
     }
 
-    /// All facts, each on its own line.
+    /// Writes all facts, each on its own line.
     fn details(&self, out: &mut dyn Write) -> io::Result<()> {
         let entry = self.entry;
         let mut lines = Vec::new();
@@ -95,15 +95,15 @@ impl<'a> ObjectFacts<'a> {
             .map(|(name, cell)| format!("{name} {}", cell.shown()))
             .collect();
         lines.push(facts.join(", "));
-        lines.push(self.of(|described| &described.text).to_owned());
+        lines.push(self.text_of(|described| &described.text).to_owned());
         lines.extend(self.values());
         if let Some(signature) = self.described().and_then(|described| described.signature) {
             lines.push(format!("takes the signature \"{}\"", signature.as_str()));
         }
         lines.push(self.stored().map_or_else(String::new, |group| format!("stored by 1010h: {group}")));
         let prefixed = |name: &str, text: &str| if text.is_empty() { String::new() } else { format!("{name}: {text}") };
-        lines.push(prefixed("manual", self.of(|described| &described.page)));
-        lines.push(prefixed("doubt", self.of(|described| &described.doubt)));
+        lines.push(prefixed("manual", self.text_of(|described| &described.page)));
+        lines.push(prefixed("doubt", self.text_of(|described| &described.doubt)));
         writeln!(out, "{}  {}", entry.object, text::safe(&entry.full_name()))?;
         let lines = lines.iter().filter(|line| !line.is_empty());
         lines.into_iter().try_for_each(|line| writeln!(out, "  {}", text::safe(line)))
@@ -113,7 +113,7 @@ impl<'a> ObjectFacts<'a> {
         self.described()?.stored.map(|group| group.as_str())
     }
 
-    /// One line of the table for consecutive objects, from the first to the last.
+    /// Returns one line of the table for the consecutive objects from `first` to `last`.
     fn row(first: &ObjectFacts<'_>, last: ObjectId) -> Vec<String> {
         let entry = first.entry;
         let (object, name) = if entry.object == last {
@@ -123,7 +123,7 @@ impl<'a> ObjectFacts<'a> {
         };
         let data_type = first.data_type().map_or_else(|| "-".to_owned(), |data_type| data_type.to_string());
         let shown = [Cell::from(first.range()), first.scalar(&entry.default), first.unit()].map(|cell| cell.shown());
-        let page = Cell::from(first.of(|described| &described.page)).shown();
+        let page = Cell::from(first.text_of(|described| &described.page)).shown();
         let pdo = if entry.pdo { "pdo" } else { "-" };
         let head = [object, name, data_type, entry.access.as_str().to_owned(), pdo.to_owned()];
         head.into_iter().chain(shown).chain([page]).collect()
@@ -138,7 +138,7 @@ impl<'a> ObjectFacts<'a> {
 
 const HEADING: [&str; 9] = ["OBJECT", "NAME", "TYPE", "ACCESS", "PDO", "RANGE", "DEFAULT", "UNIT", "MANUAL"];
 
-/// The values and ranges that an object accepts, if they are not one range.
+/// The values and ranges that an object accepts; empty if it accepts a single range.
 fn ranges(entry: &ObjectEntry) -> Vec<String> {
     let is_hexadecimal = is_usually_hexadecimal(entry.at.first);
     let number = |number: u32| if is_hexadecimal { format!("0x{number:08X}") } else { number.to_string() };
@@ -199,9 +199,9 @@ impl Report for ObjectFacts<'_> {
             Cell::list(self.values()),
             signature.map(|signature| signature.as_str()).into(),
             self.stored().into(),
-            self.of(|described| &described.text).into(),
-            self.of(|described| &described.page).into(),
-            self.of(|described| &described.doubt).into(),
+            self.text_of(|described| &described.text).into(),
+            self.text_of(|described| &described.page).into(),
+            self.text_of(|described| &described.doubt).into(),
         ]
     }
 

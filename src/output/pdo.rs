@@ -105,12 +105,12 @@ pub struct ReceivedTpdo {
     pub node: NodeId,
     /// The number of the TPDO.
     pub number: TpdoNumber,
-    /// The values, in the order of its bytes.
+    /// The values, in the order of the bytes.
     pub values: Vec<(Source, Sample)>,
 }
 
 impl ReceivedTpdo {
-    /// A TPDO with its samples. `sources` are those of the decoder.
+    /// Combines the samples of a TPDO with their sources. `sources`: all sources of the decoder.
     pub fn new(at: Stamp, node: NodeId, number: TpdoNumber, samples: &[Sample], sources: &[Source]) -> ReceivedTpdo {
         let value = |sample: &Sample| Some((sources.get(sample.source)?.clone(), sample.clone()));
         ReceivedTpdo { at, node, number, values: samples.iter().filter_map(value).collect() }

@@ -1,6 +1,6 @@
 //! Plots of recordings: as SVG, as PNG, and in a terminal.
 //!
-//! Signals with one unit share one panel with one axis. All panels share the time axis.
+//! Signals with the same unit share a panel and its value axis. All panels share the time axis.
 
 mod axis;
 mod marks;
@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 pub use svg::svg;
 pub use terminal::terminal;
 
-/// A plot without its size.
+/// A plot, independent of its size on paper or in a terminal.
 #[derive(Debug)]
 pub struct Plot {
     title: String,
@@ -45,8 +45,8 @@ struct Labelled {
 }
 
 impl Plot {
-    /// A plot of everything in a recording from the first to the second time. Without the first time, it starts at the
-    /// first value. Without the second time, it ends at the last value. `None` if there is no value.
+    /// Plots a recording from the first to the second time of `span` [default: from the first to the last value].
+    /// `None` if there is no value in this time.
     pub fn new(recording: Recording, title: String, axis: TimeAxis, span: [Option<i64>; 2]) -> Option<Plot> {
         let (from, to) = (span[0].unwrap_or(i64::MIN), span[1].unwrap_or(i64::MAX));
         let mut units: BTreeMap<usize, Vec<Curve>> = BTreeMap::new();
@@ -75,7 +75,7 @@ impl Plot {
         (!panels.is_empty()).then_some(Plot { title, axis, span, panels, events })
     }
 
-    /// The number of events by their words: `2 emcy, 1 gap`.
+    /// The number of events of each kind: `2 emcy, 1 gap`.
     fn event_counts(&self) -> String {
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         self.events.iter().for_each(|event| *counts.entry(&event.event).or_default() += 1);
@@ -83,7 +83,7 @@ impl Plot {
         texts.join(", ")
     }
 
-    /// The position of a time from 0 to 1.
+    /// The position of a time on the time axis, from 0 to 1.
     fn place(&self, at: i64) -> f64 {
         (at - self.span.0) as f64 / (self.span.1 - self.span.0) as f64
     }
@@ -91,7 +91,8 @@ impl Plot {
 
 impl Panel {
     fn new(curves: Vec<Curve>) -> Panel {
-        let is_same = |of: &dyn Fn(&Curve) -> String| curves.iter().all(|curve| of(curve) == of(&curves[0]));
+        let is_same =
+            |property: &dyn Fn(&Curve) -> String| curves.iter().all(|curve| property(curve) == property(&curves[0]));
         let unit = match curves[0].unit.as_str() {
             "" | "code" => String::new(),
             unit => format!(" [{unit}]"),
@@ -128,7 +129,7 @@ impl Panel {
     }
 }
 
-/// The positions of labels at the side of a panel: near `wanted`, at least `distance` apart, from 0 to `end`.
+/// Places labels at the side of a panel: near `wanted`, at least `distance` apart, from 0 to `end`.
 fn spread(wanted: &[f64], distance: f64, end: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..wanted.len()).collect();
     order.sort_by(|a, b| wanted[*a].total_cmp(&wanted[*b]));

@@ -22,16 +22,16 @@ pub(super) const REDRAWS_PER_SECOND: u8 = 10;
 #[derive(Debug)]
 pub struct Progress {
     multi: MultiProgress,
-    /// Whether nothing is shown. Asked for each frame.
+    /// Whether nothing is shown. Stored, because it is checked for each frame.
     is_hidden: bool,
-    /// All lines in one bar. They are then drawn together.
+    /// One bar with all lines, so that they are drawn together.
     lines: ProgressBar,
     table: LiveTable,
     color: bool,
     /// The width of the terminal and the lengths of the lines at the last redraw.
     drawn: (usize, Vec<usize>),
-    /// The time and the rows at the start of the present second.
-    second: (Duration, u64),
+    /// The time and the number of rows at the start of the present rate measurement.
+    rate_start: (Duration, u64),
     rows_per_second: f64,
 }
 
@@ -48,7 +48,7 @@ impl Progress {
         let color = has_color(color);
         let (table, drawn) = (LiveTable::default(), (0, Vec::new()));
         let is_hidden = multi.is_hidden();
-        Progress { multi, is_hidden, lines, table, color, drawn, second: (Duration::ZERO, 0), rows_per_second: 0.0 }
+        Progress { multi, is_hidden, lines, table, color, drawn, rate_start: (Duration::ZERO, 0), rows_per_second: 0.0 }
     }
 
     /// Returns the [`MultiProgress`]: the console prints its lines between the redraws.
@@ -73,15 +73,15 @@ impl Progress {
         }
     }
 
-    /// Redraws.
+    /// Updates the rate of rows, and redraws the lines.
     pub fn tick(&mut self, now: Mono, counts: LiveCounts) {
         if self.is_hidden() {
             return;
         }
-        let passed = counts.elapsed.saturating_sub(self.second.0);
+        let passed = counts.elapsed.saturating_sub(self.rate_start.0);
         if passed >= MIN_RATE_WINDOW {
-            self.rows_per_second = counts.rows.saturating_sub(self.second.1) as f64 / passed.as_secs_f64();
-            self.second = (counts.elapsed, counts.rows);
+            self.rows_per_second = counts.rows.saturating_sub(self.rate_start.1) as f64 / passed.as_secs_f64();
+            self.rate_start = (counts.elapsed, counts.rows);
         }
         let size = stderr_size().unwrap_or((80, 24));
         let counts = LiveCounts { rows_per_second: self.rows_per_second, ..counts };
@@ -90,7 +90,7 @@ impl Progress {
         let (width, before) = std::mem::replace(&mut self.drawn, (size.0, lengths));
         let wrapped: usize = before.iter().map(|length| length.saturating_sub(1) / size.0.max(1)).sum();
         if size.0 < width && wrapped > 0 {
-            // The narrower terminal has wrapped the lines. If it is closed, there is nothing to draw.
+            // The narrower terminal has wrapped the lines, so they are erased. If it is closed, the error is ignored.
             let _ = write!(io::stderr(), "\x1b[{wrapped}A\r\x1b[J");
         }
         self.lines.set_message(text);
@@ -119,7 +119,7 @@ struct LineTerminal {
 #[derive(Debug, Default)]
 struct ScreenOutput {
     text: String,
-    /// Whether the next text is on the next line.
+    /// Whether the next text starts on a new line.
     is_line_full: bool,
 }
 
@@ -185,7 +185,7 @@ impl TermLike for LineTerminal {
         let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
         output.is_line_full = false;
         let text = std::mem::take(&mut output.text);
-        // Until the program knows that the terminal is narrower, lines are cut and not wrapped.
+        // Automatic line wrap is off during the output: if the terminal has become narrower, lines are cut.
         let mut err = io::stderr();
         write!(err, "\x1b[?7l{text}\x1b[?7h")?;
         err.flush()
@@ -199,7 +199,7 @@ const TICK: Duration = Duration::from_millis(200);
 #[derive(Debug)]
 pub struct TransferProgress {
     bar: Option<ProgressBar>,
-    /// The number of calls of [`TransferProgress::show_bytes`], ten per second.
+    /// The number of calls of [`TransferProgress::show_bytes`]. There are ten calls per second.
     calls: Cell<u32>,
 }
 
@@ -235,12 +235,12 @@ impl TransferProgress {
     }
 }
 
-/// A line on stderr while a command works, with the time.
+/// A line on stderr with the elapsed time, while a command works.
 #[derive(Debug)]
 pub struct Activity(ProgressBar);
 
 impl Activity {
-    /// `asking all nodes`; hidden unless `show`.
+    /// Shows a line such as `asking all nodes`; hidden unless `show`.
     pub fn new(show: bool, what: &'static str) -> Activity {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         if show {
@@ -252,7 +252,7 @@ impl Activity {
         Activity(bar)
     }
 
-    /// Prints other lines above.
+    /// Prints other lines above this line.
     pub fn above(&self, print: impl FnOnce()) {
         self.0.suspend(print);
     }

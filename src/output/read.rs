@@ -16,18 +16,18 @@ pub struct ReadValue<'a> {
     unit: String,
     status: Option<Status>,
     /// Whether the text contains only the number.
-    is_bare: bool,
+    is_number_only: bool,
 }
 
 impl<'a> ReadValue<'a> {
     /// A value in the unit of the device.
-    pub fn new(source: &'a Source, sample: &Sample, is_bare: bool) -> ReadValue<'a> {
+    pub fn new(source: &'a Source, sample: &Sample, is_number_only: bool) -> ReadValue<'a> {
         let text = sample.value.map(|value| value.to_string()).unwrap_or_default();
         let unit = source.unit.to_string();
-        ReadValue { source, value: sample.value, text, unit, status: sample.status, is_bare }
+        ReadValue { source, value: sample.value, text, unit, status: sample.status, is_number_only }
     }
 
-    /// The same value in another unit.
+    /// Replaces the value and the unit by `value` in `unit`.
     #[must_use]
     pub fn converted(self, value: Option<f64>, unit: Unit) -> ReadValue<'a> {
         let text = value.map(|value| text::significant(value, significant_digits(self.value))).unwrap_or_default();
@@ -72,7 +72,7 @@ impl Report for ReadValue<'_> {
 
     fn text(reports: &[Self], out: &mut dyn Write) -> io::Result<()> {
         match reports {
-            [bare] if bare.is_bare => writeln!(out, "{}", bare.text),
+            [single] if single.is_number_only => writeln!(out, "{}", single.text),
             reports => rows_only(reports, out),
         }
     }

@@ -66,7 +66,7 @@ pub enum TimeBase {
 pub struct Omitted {
     /// Lines that are not rows.
     pub lines: u64,
-    /// The number of the first such line.
+    /// The number of the first line that is not a row.
     pub first: u64,
     /// Whether the last line is incomplete.
     pub is_cut: bool,
@@ -83,7 +83,7 @@ pub enum RecordingError {
     OtherKind,
 }
 
-/// The table that the next lines of a CSV file belong to.
+/// The table to which the next lines of a CSV file belong, with the delimiter.
 #[derive(Debug)]
 enum Table {
     Long(u8),
@@ -103,17 +103,18 @@ pub struct Recording {
     run: usize,
     elapsed: i64,
     clock: Clock,
-    /// The curve of the last value: rows repeat the signals in the same order.
+    /// The index of the curve of the last value. The next value is usually in the next curve, because rows repeat the
+    /// signals in the same order.
     last: usize,
     /// The usual interval of each curve of a running recording.
     intervals: Vec<IntervalTracker>,
 }
 
-/// A running recording keeps at most this many values of each signal.
-const MOST_POINTS: usize = 1 << 15;
+/// The largest number of values of each signal that a running recording keeps.
+const MAX_POINTS: usize = 1 << 15;
 
-/// The columns of time in which a running recording keeps the first, the lowest, the highest and the last value.
-const COLUMNS: i64 = 1 << 11;
+/// The number of time columns. In each, a running recording keeps the first, lowest, highest and last value.
+const TIME_COLUMNS: i64 = 1 << 11;
 
 impl Recording {
     /// An empty recording.
@@ -130,7 +131,7 @@ impl Recording {
         }
     }
 
-    /// Adds a value of a running recording. Its memory stays limited.
+    /// Adds a value of a running recording. If there are too many values, some are removed.
     pub fn push(&mut self, sample: &Sample, source: &Source) {
         let at = microseconds(sample.at);
         let value = sample.value.map_or(f64::NAN, |value| value.as_f64());
@@ -141,14 +142,14 @@ impl Recording {
         if self.intervals[self.last].add(sample.at.mono, None).is_some() {
             points.insert(points.len() - 1, gap(at));
         }
-        if points.len() >= MOST_POINTS {
+        if points.len() >= MAX_POINTS {
             thin_out(points);
         }
     }
 
     /// Adds an event of a running recording.
     pub fn push_event(&mut self, at: Stamp, node: Option<u8>, event: &str) {
-        if self.events.len() < MOST_POINTS {
+        if self.events.len() < MAX_POINTS {
             self.events.push(EventMark { at: microseconds(at), node, event: event.to_owned() });
         }
     }
@@ -163,7 +164,7 @@ impl Recording {
         loop {
             line.clear();
             match input.read_until(b'\n', &mut line) {
-                // A compressed file that was cut off.
+                // The compressed file was cut off.
                 Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => omitted.is_cut = true,
                 read => drop(read.map_err(RecordingError::Io)?),
             }
@@ -200,7 +201,7 @@ impl Recording {
         }
     }
 
-    /// Puts the values and events in the order of their times, and finds the gaps. Files can be given in any order.
+    /// Sorts values and events by time, because files can be given in any order. Then marks the gaps.
     pub fn finish(&mut self) {
         for curve in &mut self.curves {
             if !curve.points.is_sorted_by_key(|point| point.at) {
@@ -211,7 +212,7 @@ impl Recording {
         self.events.sort_by_key(|event| event.at);
     }
 
-    /// Reads one row. `None` if it is not one.
+    /// Reads one row. `None` if the line is not a row.
     fn row(&mut self, row: &[u8], table: Option<&Table>) -> Option<()> {
         if row.starts_with(b"{") {
             return self.json_row(row);
@@ -252,14 +253,14 @@ impl Recording {
 
     fn json_row(&mut self, row: &[u8]) -> Option<()> {
         if let Ok(row) = serde_json::from_slice::<LongRow>(row) {
-            let at = self.choose(row.time.0, micros(row.elapsed_s));
+            let at = self.choose_time(row.time.0, micros(row.elapsed_s));
             let status = status(row.status.as_deref().unwrap_or_default().as_bytes())?;
             let point = Point { at, value: row.value.unwrap_or(f64::NAN), status };
             self.add(row.node, &row.signal, row.unit.as_deref().unwrap_or_default(), point);
             return Some(());
         }
         let row = serde_json::from_slice::<WideRow>(row).ok()?;
-        let at = self.choose(row.time?, micros(row.elapsed_s?));
+        let at = self.choose_time(row.time?, micros(row.elapsed_s?));
         for (name, value) in &row.values {
             let (node, signal, unit) = wide_column(name)?;
             let status_name = format!("{node}.{signal}.status");
@@ -273,14 +274,14 @@ impl Recording {
         Some(())
     }
 
-    /// The time of a row from its first two cells.
+    /// Reads the time of a row from its first two cells.
     fn time(&mut self, cells: &mut Cells<'_>) -> Option<i64> {
         let time = self.clock.time(&cells.next()?)?;
         let elapsed = micros(decimal(&cells.next()?)?);
-        Some(self.choose(time, elapsed))
+        Some(self.choose_time(time, elapsed))
     }
 
-    fn choose(&mut self, time: i64, elapsed: i64) -> i64 {
+    fn choose_time(&mut self, time: i64, elapsed: i64) -> i64 {
         if self.base == TimeBase::Clock {
             return time;
         }
@@ -294,12 +295,12 @@ impl Recording {
 
     fn add(&mut self, node: u8, signal: &str, unit: &str, point: Point) {
         let run = self.run;
-        let is_it =
+        let is_same =
             |curve: &Curve| curve.node == node && curve.run == run && curve.signal == signal && curve.unit == unit;
         let next = if self.last + 1 < self.curves.len() { self.last + 1 } else { 0 };
-        self.last = match self.curves.get(next).is_some_and(is_it) {
+        self.last = match self.curves.get(next).is_some_and(is_same) {
             true => next,
-            false => self.curves.iter().position(is_it).unwrap_or_else(|| {
+            false => self.curves.iter().position(is_same).unwrap_or_else(|| {
                 let (signal, unit) = (signal.to_owned(), unit.to_owned());
                 self.curves.push(Curve { node, signal, unit, run, points: Vec::new() });
                 self.curves.len() - 1
@@ -313,12 +314,12 @@ fn microseconds(at: Stamp) -> i64 {
     i64::try_from(at.wall.since_epoch().as_micros()).unwrap_or(i64::MAX)
 }
 
-/// A gap before the value at this time.
+/// Returns a point that marks a gap before the value at this time.
 fn gap(at: i64) -> Point {
     Point { at, value: f64::NAN, status: None }
 }
 
-/// Adds the gaps: intervals that are longer than three usual intervals.
+/// Marks the gaps: intervals that are longer than three usual intervals.
 fn mark_gaps(points: &mut Vec<Point>) {
     let Some(start) = points.first().map(|point| point.at) else { return };
     let mut intervals = IntervalTracker::default();
@@ -335,16 +336,16 @@ fn mark_gaps(points: &mut Vec<Point>) {
     *points = std::mem::take(points).into_iter().enumerate().flat_map(with_gap).flatten().collect();
 }
 
-/// Keeps of each column of time the first, the lowest, the highest and the last value, a gap, and each status once.
+/// Keeps in each time column: the first, lowest, highest and last value, one gap, and one value with each status.
 fn thin_out(points: &mut Vec<Point>) {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return };
-    let (first, width) = (first.at, (last.at - first.at) / COLUMNS + 1);
+    let (first, width) = (first.at, (last.at - first.at) / TIME_COLUMNS + 1);
     let mut kept = Vec::new();
     for column in points.chunk_by(|a, b| (a.at - first) / width == (b.at - first) / width) {
-        let of = |at: usize| column[at].value;
-        let numbers = || (0..column.len()).filter(|&at| of(at).is_finite());
-        let lowest = numbers().min_by(|&a, &b| of(a).total_cmp(&of(b)));
-        let highest = numbers().max_by(|&a, &b| of(a).total_cmp(&of(b)));
+        let value_at = |at: usize| column[at].value;
+        let numbers = || (0..column.len()).filter(|&at| value_at(at).is_finite());
+        let lowest = numbers().min_by(|&a, &b| value_at(a).total_cmp(&value_at(b)));
+        let highest = numbers().max_by(|&a, &b| value_at(a).total_cmp(&value_at(b)));
         let gap = column.iter().position(|point| point.value.is_nan() && point.status.is_none());
         let marks = MARKED.map(|status| column.iter().position(|point| point.status == Some(status)));
         let ends = [numbers().next(), lowest, highest, numbers().next_back(), gap];
@@ -356,7 +357,7 @@ fn thin_out(points: &mut Vec<Point>) {
     *points = kept;
 }
 
-/// The table that a header starts. `None` if the line is not a header.
+/// Returns the table that starts with this header. `None` if the line is not a header.
 fn header(line: &[u8]) -> Option<Table> {
     let delimiter = *line.strip_prefix(LONG_COLUMNS[0].as_bytes())?.first()?;
     if !matches!(delimiter, b',' | b';' | b'|' | b'\t') {
@@ -392,7 +393,7 @@ fn point(at: i64, value: &[u8], word: &[u8]) -> Option<Point> {
 /// The statuses that a plot marks.
 pub(super) const MARKED: [Status; 4] = [Status::OverloadHigh, Status::OverloadLow, Status::Clipped, Status::Invalid];
 
-/// The status of a word; `Some(None)` for `ok` and for no status. `None` if it is not a status.
+/// Parses a status: `Some(None)` for `ok` and for an empty word. `None` if the word is not a status.
 fn status(word: &[u8]) -> Option<Option<Status>> {
     if word.is_empty() || word == Status::Ok.as_str().as_bytes() {
         return Some(None);

@@ -74,7 +74,7 @@ pub struct Column {
     nested: &'static [Column],
 }
 
-/// The columns of a report that extends another report. `SUM` is `N + M`.
+/// Returns the columns of a report that extends another report. `SUM` is `N + M`.
 pub const fn joined<const N: usize, const M: usize, const SUM: usize>(
     first: [Column; N],
     then: [Column; M],
@@ -100,37 +100,37 @@ impl Column {
         Column { nested, in_table: false, ..Column::new(name) }
     }
 
-    /// Aligned to the right in the table.
+    /// Aligns the column to the right in the table.
     pub const fn right(self) -> Column {
         Column { align: Align::Right, ..self }
     }
 
-    /// Another heading in the table.
+    /// Sets another heading for the table.
     pub const fn heading(self, heading: &'static str) -> Column {
         Column { heading: Some(heading), ..self }
     }
 
-    /// Only in JSON.
+    /// Prints the column only in JSON.
     pub const fn json_only(self) -> Column {
         Column { in_csv: false, in_table: false, ..self }
     }
 
-    /// Only in CSV.
+    /// Prints the column only in CSV.
     pub const fn csv_only(self) -> Column {
         Column { in_json: false, in_table: false, ..self }
     }
 
-    /// Only in the table.
+    /// Prints the column only in the table.
     pub const fn table_only(self) -> Column {
         Column { in_json: false, in_csv: false, ..self }
     }
 
-    /// In CSV and the table, not in JSON.
+    /// Prints the column in CSV and the table, not in JSON.
     pub const fn not_json(self) -> Column {
         Column { in_json: false, ..self }
     }
 
-    /// In JSON and CSV, not in the table.
+    /// Prints the column in JSON and CSV, not in the table.
     pub const fn data_only(self) -> Column {
         Column { in_table: false, ..self }
     }
@@ -147,7 +147,7 @@ pub trait Report: Sized {
     /// The text form. Default: a table with a heading.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// `out` cannot be written.
     fn text(reports: &[Self], out: &mut dyn Write) -> io::Result<()> {
         table(reports, out)
     }
@@ -156,7 +156,7 @@ pub trait Report: Sized {
     /// two blanks.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// `out` cannot be written.
     fn line(&self, out: &mut dyn Write) -> io::Result<()> {
         let shown = Self::COLUMNS.iter().zip(self.cells()).filter(|(column, _)| column.in_table);
         let cells: Vec<String> = shown.map(|(_, cell)| cell.shown()).collect();
@@ -167,7 +167,7 @@ pub trait Report: Sized {
 /// Prints reports in this format. All bytes are written together.
 ///
 /// # Errors
-/// Those of `out`.
+/// `out` cannot be written.
 pub fn render<R: Report>(reports: &[R], format: Format, out: &mut dyn Write) -> io::Result<()> {
     let mut bytes = Vec::new();
     match format {
@@ -193,7 +193,7 @@ impl<R: Report, W: Write> Stream<R, W> {
     /// Starts the output. For CSV, writes the header.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// `out` cannot be written.
     pub fn new(format: Format, mut out: W) -> io::Result<Stream<R, W>> {
         if format == Format::Csv {
             csv::write(&mut out, &csv_head::<R>(), [])?;
@@ -204,7 +204,7 @@ impl<R: Report, W: Write> Stream<R, W> {
     /// Prints one report and flushes it.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// `out` cannot be written.
     pub fn push(&mut self, report: &R) -> io::Result<()> {
         let mut bytes = Vec::new();
         match self.format {
@@ -217,10 +217,10 @@ impl<R: Report, W: Write> Stream<R, W> {
     }
 }
 
-/// A table with a heading; nothing if there are no reports.
+/// Writes a table with a heading; nothing if there are no reports.
 ///
 /// # Errors
-/// Those of `out`.
+/// `out` cannot be written.
 pub fn table<R: Report>(reports: &[R], out: &mut dyn Write) -> io::Result<()> {
     if reports.is_empty() {
         return Ok(());
@@ -232,10 +232,10 @@ pub fn table<R: Report>(reports: &[R], out: &mut dyn Write) -> io::Result<()> {
     table::write(out, &aligns::<R>(), &rows)
 }
 
-/// The same table without a heading.
+/// Writes the table without a heading.
 ///
 /// # Errors
-/// Those of `out`.
+/// `out` cannot be written.
 pub fn rows_only<R: Report>(reports: &[R], out: &mut dyn Write) -> io::Result<()> {
     table::write(out, &aligns::<R>(), &reports.iter().map(shown).collect::<Vec<_>>())
 }
@@ -251,13 +251,13 @@ fn shown<R: Report>(report: &R) -> Vec<String> {
 }
 
 fn csv_head<R: Report>() -> Vec<&'static str> {
-    fn of(column: &'static Column) -> Vec<&'static str> {
+    fn names(column: &'static Column) -> Vec<&'static str> {
         match column.nested {
             [] => vec![column.name],
             nested => nested.iter().filter(|column| column.in_csv).map(|column| column.name).collect(),
         }
     }
-    R::COLUMNS.iter().filter(|column| column.in_csv).flat_map(of).collect()
+    R::COLUMNS.iter().filter(|column| column.in_csv).flat_map(names).collect()
 }
 
 /// The CSV rows of a report: one row, or one per nested row.

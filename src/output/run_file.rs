@@ -1,4 +1,4 @@
-//! The file of a run, `run.csv.run.json`: what the rows of a recording do not contain. One JSON object for each run.
+//! The run file, `run.csv.run.json`: facts that the rows of a recording do not contain. Each run is one JSON object.
 
 use super::json;
 use crate::bus::Wall;
@@ -57,7 +57,7 @@ impl From<&Node> for RunNode {
 }
 
 impl RunRecord {
-    /// The line of the run.
+    /// Returns the run as one line of JSON.
     ///
     /// # Errors
     /// None: writing to memory cannot fail.

@@ -7,7 +7,7 @@ use crate::canopen::value::Value;
 use crate::tasks::sdo::ReadValue;
 use std::io::{self, Write};
 
-/// The report of a value of an object.
+/// A value of an object that was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectValue {
     /// The value.
@@ -32,7 +32,7 @@ pub enum ValueForm {
     Bytes,
 }
 
-/// The bytes of a number as a hexadecimal number with all its digits. `None` for more than eight bytes.
+/// Formats the bytes of a number in hexadecimal, with leading zeros. `None` for more than eight bytes.
 fn hexadecimal(bytes: &[u8]) -> Option<String> {
     let digits: String = bytes.iter().rev().map(|byte| format!("{byte:02X}")).collect();
     (1..=8).contains(&bytes.len()).then(|| format!("0x{digits}"))
@@ -68,7 +68,7 @@ impl ObjectValue {
     }
 }
 
-/// The usual text of a value. `raw` has its bytes.
+/// The usual text of a value. `raw`: the bytes of the value.
 pub(super) fn usual(object: ObjectId, value: &Value, raw: &[u8]) -> String {
     match value {
         Value::Text(text) => text::safe(text),

@@ -255,7 +255,7 @@ impl Report for ErrorReport {
     }
 }
 
-/// The counters of errors: one object each.
+/// Returns the error counters as a list, with one object for each counter.
 pub(super) fn counters_cell(errors: &Errors) -> Cell {
     let cell = |counter: &ErrorCounter| {
         let (name, text) = (counter.name.as_str().into(), counter.text.as_str().into());

@@ -17,7 +17,7 @@ use std::time::Duration;
 pub struct Written {
     /// Rows in the layout `long` or `wide`.
     pub rows: u64,
-    /// The rows among them that were lost because writing was too slow or failed.
+    /// The number of these rows that were lost, because writing was too slow or failed.
     pub lost: u64,
     /// Events that were lost.
     pub events_lost: u64,
@@ -246,7 +246,7 @@ fn signal_table(signals: &[(Source, Statistics)], form: SummaryForm) -> Vec<Stri
         column
     };
     let time = |time: Option<Duration>| time.map_or_else(|| "-".to_owned(), format_duration);
-    let jitter = |statistics: &Statistics, of: &dyn Fn(Jitter) -> Duration| time(statistics.jitter().map(of));
+    let jitter = |statistics: &Statistics, part: &dyn Fn(Jitter) -> Duration| time(statistics.jitter().map(part));
     let is_any = |count: &dyn Fn(&Statistics) -> u64| signals.iter().any(|(_, statistics)| count(statistics) > 0);
     let mut columns = vec![
         column("NODE", Right, 0, &|source, _| source.node.to_string()),
@@ -274,9 +274,9 @@ fn signal_table(signals: &[(Source, Statistics)], form: SummaryForm) -> Vec<Stri
     }
     let length = |columns: &[SignalColumn]| columns.iter().map(|column| column.width() + 2).sum::<usize>();
     while length(&columns) > form.width.unwrap_or(usize::MAX).saturating_add(2)
-        && let Some(most) = columns.iter().map(|column| column.rank).max().filter(|rank| *rank > 0)
+        && let Some(highest_rank) = columns.iter().map(|column| column.rank).max().filter(|rank| *rank > 0)
     {
-        columns.retain(|column| column.rank != most);
+        columns.retain(|column| column.rank != highest_rank);
     }
     let head = columns.iter().map(|column| column.heading.to_owned()).collect();
     let rows = (0..signals.len()).map(|row| columns.iter().map(|column| column.cells[row].clone()).collect());
@@ -289,7 +289,7 @@ fn signal_table(signals: &[(Source, Statistics)], form: SummaryForm) -> Vec<Stri
     String::from_utf8_lossy(&out).lines().map(|line| line.chars().take(width).collect()).collect()
 }
 
-/// A time with three digits, for people.
+/// Rounds a time to three digits, so that it is easy to read.
 fn rounded(time: Duration) -> Duration {
     let digits = time.as_micros().checked_ilog10().unwrap_or(0);
     let unit = 10u64.pow(digits.saturating_sub(2)) * 1000;
@@ -344,7 +344,7 @@ fn syncs(syncs: &SyncStatistics) -> Option<String> {
 /// Writes the summary as one JSON object.
 ///
 /// # Errors
-/// Those of `out`.
+/// `out` cannot be written.
 pub fn write_json(summary: &Summary<'_>, out: &mut dyn Write) -> io::Result<()> {
     render(std::slice::from_ref(summary), Format::Json, out)
 }

@@ -32,8 +32,8 @@ pub(super) fn is_unsafe(character: char) -> bool {
 /// The longest line of an error in characters.
 const LONGEST_LINE: usize = 200;
 
-/// A message as one line of at most 200 characters. The middle of a longer message is omitted, because the cause is at
-/// the end.
+/// Converts a message to one line of at most 200 characters. Of a longer message, the middle is omitted, because the
+/// cause is at the end.
 pub fn one_line(text: &str) -> String {
     let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
     let letters: Vec<char> = joined.chars().collect();
@@ -45,7 +45,7 @@ pub fn one_line(text: &str) -> String {
     format!("{} … {}", part(&letters[..half]), part(&letters[letters.len() - half..]))
 }
 
-/// A line as lines of at most `width` characters, broken at spaces. Further lines are indented.
+/// Breaks a line at spaces into lines of at most `width` characters. All lines but the first are indented.
 pub fn folded(line: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in line.split(' ') {
@@ -61,8 +61,8 @@ pub fn folded(line: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// The part of a long input around the place after `before` characters, and the number of its characters before the
-/// place.
+/// Returns the part of a long input around the character number `before`, and the number of this character in the part.
+/// Both numbers count from 0.
 pub fn around(text: &str, before: usize) -> (String, usize) {
     let letters: Vec<char> = text.chars().collect();
     let from = if letters.len() <= LONGEST_LINE { 0 } else { before.saturating_sub(LONGEST_LINE / 2) };

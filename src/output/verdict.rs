@@ -73,7 +73,7 @@ fn reason_text(reason: &Reason, failures: &[Failure]) -> String {
     }
 }
 
-/// The first sample that does not satisfy the expression.
+/// Describes the first sample that does not satisfy the expression.
 fn violation(verdict: &Verdict, first: &Violation) -> String {
     let has_values = first.values.iter().any(Option::is_some);
     let text = match first.status {
@@ -101,7 +101,7 @@ pub fn values(quantities: &[QuantityValue], values: &[Option<f64>]) -> String {
 fn number(quantity: &QuantityValue, value: f64) -> String {
     match quantity.digits {
         Some(digits) => format!("{value:.*}", usize::from(digits)),
-        // The mean of exact values can be long.
+        // A mean of exact values can have many digits.
         None if quantity.is_exact && value.to_string().len() <= MAX_EXACT_LENGTH => value.to_string(),
         None => {
             let text = significant(value, CALCULATED_DIGITS);
@@ -116,7 +116,7 @@ fn number(quantity: &QuantityValue, value: f64) -> String {
 }
 
 /// The word for an outcome in JSON and CSV.
-fn field(outcome: Outcome) -> &'static str {
+fn data_word(outcome: Outcome) -> &'static str {
     match outcome {
         Outcome::Ok => "ok",
         Outcome::Fail => "fail",
@@ -155,7 +155,7 @@ impl Report for VerdictRow<'_> {
         vec![
             verdict.text.as_str().into(),
             verdict.node.into(),
-            field(verdict.outcome).into(),
+            data_word(verdict.outcome).into(),
             verdict.count.into(),
             verdict.violations.into(),
             verdict.invalid.into(),

@@ -14,7 +14,7 @@ use crate::tasks::Failure;
 use crate::tasks::log::{Change, LogEvent, Remark, TpdoChange};
 use std::time::Duration;
 
-/// The text of a recording's event.
+/// Returns the text of an event of a recording.
 pub fn event_text(event: &LogEvent) -> EventText {
     use Severity::{Detail, Note as Info, Warning};
     let of_all = EventText::of_all;
@@ -131,7 +131,7 @@ fn buffer_text(buffer: ReceiveBuffer) -> String {
     format!("the receive buffer has {bytes} bytes")
 }
 
-/// The command that allows the requested receive buffer in the kernel. It doubles the requested size.
+/// Returns the command that allows the wanted receive buffer. The kernel doubles the size given in the command.
 fn allow_larger(buffer: ReceiveBuffer) -> String {
     format!("sudo sysctl net.core.rmem_max={}", buffer.wanted / 2)
 }

@@ -1,4 +1,4 @@
-//! Text for causes, effects and notes of `autozero` and `tare`.
+//! Messages, hints and notes of `autozero` and `tare`.
 
 use super::CauseText;
 use crate::canopen::id::NodeId;
@@ -156,7 +156,7 @@ fn remedy(target: ZeroTarget, failed_check: &FailedCheck, node: &str, choice: &s
 
 /// The text for an effect.
 pub(in crate::output) fn effect(node: &str, effect: &AutozeroEffect) -> NoteText {
-    let look = |text: NoteText, offset: &Option<String>, signal: &str| match offset {
+    let with_command = |text: NoteText, offset: &Option<String>, signal: &str| match offset {
         Some(object) => text.command("show the present offset", format!("cangauge sdo read {node} {object}")),
         None => text.command("show the present reading", format!("cangauge read {node} {signal}")),
     };
@@ -169,14 +169,14 @@ pub(in crate::output) fn effect(node: &str, effect: &AutozeroEffect) -> NoteText
                 Some((object, number)) => format!("the offset {object} was {number}"),
                 None => "the offset cannot be read".to_owned(),
             };
-            look(NoteText::new("offset-before", text), &offset.map(|(object, _)| object.to_string()), signal)
+            with_command(NoteText::new("offset-before", text), &offset.map(|(object, _)| object.to_string()), signal)
         }
         AutozeroEffect::NoChangeSeen { offset, signal } => {
             let text = match offset {
                 Some(_) => "the offset is unchanged",
                 None => "the offset cannot be read, and the reading is not zero",
             };
-            look(NoteText::new("no-change-seen", text), &offset.map(|object| object.to_string()), signal)
+            with_command(NoteText::new("no-change-seen", text), &offset.map(|object| object.to_string()), signal)
         }
         AutozeroEffect::Moved(Some(shift)) => {
             NoteText::new("zero-moved", format!("the zero was shifted by {}", quantity(*shift)))

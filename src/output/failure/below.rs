@@ -1,4 +1,4 @@
-//! Text for causes from the layers below the tasks: bus, SDO, LSS, expressions.
+//! Messages and hints for errors of the layers below the tasks: bus, SDO, LSS, expressions.
 
 use super::{CauseText, Place};
 use crate::bus::replay::{FileFormat, RecordingError, RecordingFormat};
@@ -15,7 +15,7 @@ use crate::tasks::journal::JournalError;
 use std::path::Path;
 use std::time::Duration;
 
-/// The bus failed.
+/// Returns the message and the hint for a bus error.
 pub(super) fn bus(error: &BusError) -> CauseText {
     let words = CauseText::new(error.to_string());
     match error {
@@ -56,7 +56,7 @@ pub(super) fn bus(error: &BusError) -> CauseText {
     }
 }
 
-/// The hint how to get a usable recording.
+/// Returns the hint that shows how to get a usable recording.
 fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
     let converted = Path::new(file).with_extension("candump.log");
     let converted = converted.display();
@@ -111,7 +111,7 @@ fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
     })
 }
 
-/// An SDO transfer failed.
+/// Returns the message and the hint for a failed SDO transfer.
 pub(super) fn sdo(error: &SdoError) -> CauseText {
     let words = CauseText::new(error.to_string());
     match error.failure {
@@ -152,7 +152,7 @@ pub(super) fn sdo(error: &SdoError) -> CauseText {
     }
 }
 
-/// A node sent two answers to one request.
+/// Returns the warning about a node that sent two answers to one request.
 pub fn second_answer(node: NodeId, answers: SecondAnswer) -> String {
     if answers.differs() {
         return format!("node {node}: {}", SdoFailure::TwoDevices(Some(answers)));
@@ -160,12 +160,12 @@ pub fn second_answer(node: NodeId, answers: SecondAnswer) -> String {
     format!("node {node}: answers arrive twice: two devices have node-ID {node}, or a bridge repeats frames")
 }
 
-/// A temporary write could not be recorded.
+/// Returns the message for a temporary write that could not be recorded in the journal.
 pub(super) fn not_recorded(error: &JournalError) -> String {
     format!("write the journal {}: {}", error.file, error.reason)
 }
 
-/// Optional objects of a node have no valid answer.
+/// Returns the note about optional objects of a node that could not be read.
 pub fn unknown_objects(node: NodeId, objects: &[ObjectId]) -> String {
     let objects: Vec<String> = objects.iter().map(ObjectId::to_string).collect();
     format!("node {node}: unknown objects (no valid answer): {}", objects.join(", "))
@@ -196,19 +196,19 @@ fn silence_advice(node: NodeId, waited: Duration, started: bool, missed: MissedA
     })
 }
 
-/// The hint for a node that sends nothing; `None` if its node-ID is unknown. `scan` fails on a dead bus, but
-/// `doctor` finds causes.
+/// Returns the hint for a node that sends nothing. `node` is `None` if its node-ID is unknown. The hint names `doctor`
+/// and not `scan`, because `scan` finds no cause on a dead bus.
 pub(super) fn check_node(node: Option<NodeId>) -> String {
     let node = node.map_or_else(|| "all".to_owned(), |node| node.to_string());
     format!("check its node-ID, power and cable; find the cause: cangauge doctor {node}")
 }
 
-/// What to do about a node that answers nothing. A stopped node without heartbeat looks the same.
+/// Returns the hint for a node that does not answer. A stopped node without heartbeat looks the same.
 pub(super) fn check_silent_node(node: NodeId) -> String {
     format!("check its node-ID, power and cable, and that it is not stopped; find the cause: cangauge doctor {node}")
 }
 
-/// An LSS service failed.
+/// Returns the message and the hint for a failed LSS service.
 pub(super) fn lss(error: &LssError) -> CauseText {
     let words = CauseText::new(error.to_string());
     let hint = match error {
@@ -259,7 +259,7 @@ fn silence_hint(service: Service) -> Option<&'static str> {
     }
 }
 
-/// An expression is wrong.
+/// Returns the message, the hint and the place for a wrong expression.
 pub(super) fn expression(error: &ExpressionError) -> CauseText {
     let place = Place { before: error.before().to_owned(), text: error.text.clone() };
     CauseText { message: error.message.clone(), hint: error.hint.clone(), place: Some(place) }

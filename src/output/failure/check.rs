@@ -1,4 +1,4 @@
-//! Text for causes: a check failed or had no data.
+//! Messages and hints if a check failed or had no data.
 
 use super::CauseText;
 use crate::measure::expression::verdict::Verdict;

@@ -1,4 +1,4 @@
-//! Text for causes, effects and notes: settings were not applied, and reports about settings that were.
+//! Messages, hints and notes about settings that were applied or not applied.
 
 use super::CauseText;
 use crate::output::notes::NoteText;

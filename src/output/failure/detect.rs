@@ -1,4 +1,4 @@
-//! Text for causes: the bit rate of a bus was not found.
+//! Messages and hints if the bit rate of a bus was not found.
 
 use super::CauseText;
 use crate::tasks::detect::DetectFailure;

@@ -1,4 +1,4 @@
-//! Text for causes: nothing was recorded, or a recording ended early.
+//! Messages and hints if nothing was recorded, or a recording ended early.
 
 use super::CauseText;
 use crate::bus::time::format_duration;
@@ -127,7 +127,7 @@ fn no_measurements(within: Duration, nodes: &[(NodeId, Silence)]) -> CauseText {
     }
 }
 
-/// A passive recording received no TPDO.
+/// Returns the message and the hint if a passive recording received no TPDO.
 fn nothing_received(
     what: &str,
     within: Duration,

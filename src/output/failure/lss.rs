@@ -1,4 +1,4 @@
-//! Text for causes and effects: a node-ID or a bit rate was not set.
+//! Messages, hints and notes if a node-ID or a bit rate was not set.
 
 use super::CauseText;
 use super::below;
@@ -86,13 +86,13 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> CauseText {
     }
 }
 
-/// A device with the same identity has another node-ID, or none.
+/// Returns the message if a device with the same identity has another node-ID, or none.
 fn other_node_id(found: Option<NodeId>) -> CauseText {
     let found = found.map_or_else(|| "has no node-ID".to_owned(), |found| format!("has node-ID {found}"));
     CauseText::new(format!("a device with the same identity answers LSS and {found}")).hint(CONNECT_ALONE)
 }
 
-/// The answers from a node-ID cannot be assigned to one device.
+/// Returns the message if the answers from a node-ID cannot be assigned to one device.
 fn duplicate_node_id(sign: DuplicateSign) -> CauseText {
     let words = duplicate(sign);
     match sign {
@@ -104,7 +104,7 @@ fn duplicate_node_id(sign: DuplicateSign) -> CauseText {
     }
 }
 
-/// An LSS service failed. A silent device may answer in STOPPED.
+/// Returns the message if an LSS service failed. If the device is silent, the hint says that it may answer in STOPPED.
 fn service(device: &DeviceName, error: &LssError) -> CauseText {
     let words = below::lss(error);
     let is_silent = matches!(error, LssError::NoAnswer { service, .. } if below::is_addressing(*service));
@@ -116,7 +116,7 @@ fn service(device: &DeviceName, error: &LssError) -> CauseText {
     }
 }
 
-/// The objects of the device cannot be used.
+/// Returns the message if the objects of the device cannot be used.
 fn objects(cause: &LssCause) -> CauseText {
     const BY_LSS: &str = "use LSS: --via lss";
     match cause {
@@ -142,7 +142,7 @@ fn objects(cause: &LssCause) -> CauseText {
     }
 }
 
-/// The bit rate is not in the table of the device.
+/// Returns the message if the bit rate is not in the table of the device.
 fn table(cause: &LssCause) -> CauseText {
     match cause {
         LssCause::NoSuchRate { title, rate, rates, has_auto, is_standard } => {
@@ -167,7 +167,7 @@ fn table(cause: &LssCause) -> CauseText {
     }
 }
 
-/// The device does not respond at its new node-ID.
+/// Returns the message if the device does not respond at its new node-ID.
 fn after_reset(failure: &Failure, cause: &LssCause) -> CauseText {
     match cause {
         LssCause::NotReset(new, why) => {
@@ -206,7 +206,7 @@ fn after_reset(failure: &Failure, cause: &LssCause) -> CauseText {
     }
 }
 
-/// Device and host did not change the bit rate together.
+/// Returns the message if device and host did not change the bit rate together.
 fn retime(cause: &LssCause) -> CauseText {
     match cause {
         LssCause::HostCannotChange(obstacle) => {
@@ -279,7 +279,7 @@ pub(in crate::output) fn effect(effect: &LssEffect) -> NoteText {
     }
 }
 
-/// How to name the device in the next command.
+/// Returns the argument that names the device in the next command.
 fn argument(device: &DeviceName) -> String {
     match (device.node, device.address) {
         (Some(node), _) => node.to_string(),

@@ -52,7 +52,7 @@ pub struct ErrorMessage {
     pub effects: Vec<NoteText>,
 }
 
-/// A character in a text entered by the user.
+/// The position of a character in a text entered by the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// The whole text.
@@ -107,12 +107,12 @@ impl ErrorMessage {
         }
     }
 
-    /// Wrong arguments.
+    /// An error about wrong arguments.
     pub fn usage(message: impl Into<String>) -> ErrorMessage {
         ErrorMessage::new(Kind::Usage, message)
     }
 
-    /// The same error with a hint.
+    /// Adds a hint to the error.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> ErrorMessage {
         self.hint = Some(hint.into());
@@ -122,7 +122,7 @@ impl ErrorMessage {
     /// Writes the error as one JSON object on one line. `exit` is the exit code of its kind.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// `out` cannot be written.
     pub fn json(&self, out: &mut dyn Write, exit: u8) -> io::Result<()> {
         #[derive(Serialize)]
         struct Object<'a> {

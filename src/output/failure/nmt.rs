@@ -1,4 +1,4 @@
-//! Text for causes: an NMT state was not reached or not confirmed.
+//! Messages and hints if an NMT state was not reached or not confirmed.
 
 use super::{CauseText, below};
 use crate::tasks::Failure;

@@ -1,4 +1,4 @@
-//! Text for causes: reading or writing a node failed.
+//! Messages and hints if a read or a write of a node failed.
 
 use super::{CauseText, below};
 use crate::canopen::value::Value;
@@ -36,10 +36,10 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> CauseText {
     }
 }
 
-/// A name that no object has, or that several objects share; then `alike` has their full names.
+/// Returns the message for a name that no object has, or that several objects share. `alike`: similar or full names.
 fn no_such_object(source: &str, name: &str, alike: &[String], is_shared: bool) -> CauseText {
-    let names = alike.iter().take(MOST_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ");
-    let more = if alike.len() > MOST_NAMES { ", ..." } else { "" };
+    let names = alike.iter().take(MAX_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let more = if alike.len() > MAX_NAMES { ", ..." } else { "" };
     match (alike.is_empty(), is_shared) {
         (true, _) => CauseText::new(format!("{source} has no object \"{name}\"")),
         (_, false) => {
@@ -51,10 +51,10 @@ fn no_such_object(source: &str, name: &str, alike: &[String], is_shared: bool) -
     }
 }
 
-/// Most names in a hint.
-const MOST_NAMES: usize = 5;
+/// The largest number of names in a hint.
+const MAX_NAMES: usize = 5;
 
-/// A value; bytes in wire order.
+/// Formats a value. Bytes are in wire order.
 pub(super) fn shown(value: &Value) -> String {
     match value {
         Value::Bytes(bytes) => text::spaced_bytes(bytes),

@@ -1,4 +1,4 @@
-//! Text for causes, effects and notes: a TPDO could not be shown or changed, and reports about a change.
+//! Messages, hints and notes if a TPDO was changed, or could not be shown or changed.
 
 use super::{CauseText, below};
 use crate::canopen::id::{CanId, NodeId};
@@ -12,7 +12,7 @@ use crate::tasks::pdo::{
 };
 use crate::tasks::store::Group;
 
-/// The largest number of entries in a list of objects that can be mapped.
+/// The largest number of mappable objects that a hint lists.
 const MAX_LISTED: usize = 16;
 
 /// The message and the hint for a cause.
@@ -110,7 +110,7 @@ fn list(entries: &[MappingEntry]) -> String {
     entries.iter().map(|&item| entry(item)).collect::<Vec<_>>().join(" ")
 }
 
-/// A list of entries; of a long list, only the first entries.
+/// Lists the entries. Of a long list, only the first entries are shown.
 fn list_some(entries: &[MappingEntry]) -> String {
     match entries.get(..MAX_LISTED) {
         Some(first) if entries.len() > MAX_LISTED => {
@@ -120,7 +120,7 @@ fn list_some(entries: &[MappingEntry]) -> String {
     }
 }
 
-/// Why a step failed: `write 0x1A00:2 (0x6132:1/8): refused by the device …`.
+/// Returns the reason why a step failed: `write 0x1A00:2 (0x6132:1/8): refused by the device …`.
 fn step(error: &StepError, write: Option<&StepWrite>) -> String {
     let at = write.map(|write| format!("{} ({})", write.object, number(write)));
     match error {
@@ -139,7 +139,7 @@ fn step(error: &StepError, write: Option<&StepWrite>) -> String {
     }
 }
 
-/// The number of a write, in the form of its object.
+/// Formats the number of a write as it is usual for its object.
 fn number(write: &StepWrite) -> String {
     match (write.object.index, write.object.sub) {
         (0x1a00..=0x1bff, 0) => format!("{} entries", write.value),
@@ -219,8 +219,8 @@ pub(in crate::output) fn fact(fact: &PdoFact) -> NoteText {
     }
 }
 
-/// The command that sets a TPDO to `old`. A TPDO that was off or empty is set with plain writes, because `map` switches
-/// it on.
+/// Returns the command that sets a TPDO to `old`. If the TPDO was off or empty, the command consists of plain writes,
+/// because `map` switches it on.
 fn recovery_command(node: &str, old: &Settings, needs_preop: bool) -> String {
     let number = old.number.get();
     if !old.cob_id.is_valid() || old.mapping.is_empty() {

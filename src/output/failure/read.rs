@@ -1,4 +1,4 @@
-//! Text for causes: measured values could not be read.
+//! Messages and hints if measured values could not be read.
 
 use super::CauseText;
 use crate::measure::sample::Status;

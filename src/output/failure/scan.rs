@@ -1,4 +1,4 @@
-//! Text for causes: a scan did not find nodes.
+//! Messages and hints if a scan did not find nodes.
 
 use super::CauseText;
 use crate::tasks::Failure;

@@ -1,4 +1,4 @@
-//! Text for causes, effects and notes: a setting could not be shown or changed, and reports about a change.
+//! Messages, hints and notes if a setting was changed, or could not be shown or changed.
 
 use super::CauseText;
 use crate::device::unit::Unit;
@@ -24,7 +24,9 @@ pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> CauseText {
         SettingsFailure::NoChannel { signal } => {
             CauseText::new(format!("{signal} is not a CiA 404 channel: it has no such setting"))
         }
-        SettingsFailure::NoUnit { signal } => CauseText::new(format!("{} has no unit (6131h)", of(signal.as_ref()))),
+        SettingsFailure::NoUnit { signal } => {
+            CauseText::new(format!("{} has no unit (6131h)", subject(signal.as_ref())))
+        }
         SettingsFailure::UnitFixed { signal, unit } => {
             CauseText::new(format!("{signal} is in {unit}, which the device cannot change"))
         }
@@ -50,7 +52,7 @@ pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> CauseText {
 }
 
 /// The subject of a message: `pressure`, or `it` for the whole device.
-fn of(signal: Option<&String>) -> &str {
+fn subject(signal: Option<&String>) -> &str {
     signal.map_or("it", String::as_str)
 }
 
@@ -94,7 +96,7 @@ fn of_limits(cause: &SettingsFailure) -> CauseText {
 fn of_filter(cause: &SettingsFailure) -> CauseText {
     match cause {
         SettingsFailure::NoFilter { signal } => {
-            CauseText::new(format!("{} has no filter (61A0h, 61A1h)", of(signal.as_ref())))
+            CauseText::new(format!("{} has no filter (61A0h, 61A1h)", subject(signal.as_ref())))
         }
         SettingsFailure::FilterConstant { signal, constant } => {
             CauseText::new(format!("{signal} does not accept the filter constant {constant}"))

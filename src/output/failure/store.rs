@@ -1,4 +1,4 @@
-//! Text for causes, effects and notes of `store` and `restore`.
+//! Messages, hints and notes of `store` and `restore`.
 
 use super::CauseText;
 use super::node::shown;

@@ -67,7 +67,7 @@ fn part_name(part: Part) -> &'static str {
     }
 }
 
-/// Serial numbers are decimal, as on labels.
+/// Formats a number. Serial numbers are decimal, as on labels.
 fn number_text(part: Part, number: u32) -> String {
     if part == Part::Serial { number.to_string() } else { format!("0x{number:X}") }
 }

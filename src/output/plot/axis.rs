@@ -1,6 +1,6 @@
-//! The ticks of the axes: round numbers, round times.
+//! The ticks of the axes, at round numbers and round times.
 
-/// Microseconds of a second.
+/// The number of microseconds in a second.
 const SECOND: i64 = 1_000_000;
 
 /// The difference between local time and UTC at a given time, in microseconds.
@@ -15,7 +15,7 @@ pub enum TimeAxis {
     Elapsed,
 }
 
-/// Steps from 1 s to 12 h.
+/// The steps between ticks from 1 s to 1 day, in seconds.
 const STEPS: [i64; 18] =
     [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10_800, 21_600, 43_200, 86_400];
 
@@ -23,14 +23,14 @@ const STEPS: [i64; 18] =
 const LONG_TIME: i64 = 120 * SECOND;
 
 impl TimeAxis {
-    fn ahead(self, at: i64) -> i64 {
+    fn utc_offset(self, at: i64) -> i64 {
         match self {
             TimeAxis::Clock(zone) => zone(at),
             TimeAxis::Elapsed => 0,
         }
     }
 
-    /// Ticks with their labels. A label has at most the share `room(characters)` of the axis.
+    /// Returns ticks with their labels. `room` is the share of the axis for a label of this number of characters.
     pub(super) fn ticks(self, span: (i64, i64), room: impl Fn(usize) -> f64) -> Vec<(i64, String)> {
         let steps = (0..6).flat_map(|power| [1, 2, 5].map(|digit| digit * 10i64.pow(power)));
         let steps = steps.chain(STEPS.map(|step| step * SECOND));
@@ -40,14 +40,14 @@ impl TimeAxis {
         let length = (span.1 - span.0) as f64;
         let fits = |step: &i64| *step as f64 / length >= room(self.label(span.0, *step, span).len());
         let step = steps.find(fits).unwrap_or(i64::MAX / 4);
-        let ahead = self.ahead(span.0);
-        let first = (span.0 + ahead).div_euclid(step) * step - ahead;
+        let utc_offset = self.utc_offset(span.0);
+        let first = (span.0 + utc_offset).div_euclid(step) * step - utc_offset;
         let ticks = (0..).map(|count| first + count * step).skip_while(|at| *at < span.0);
         ticks.take_while(|at| *at <= span.1).map(|at| (at, self.label(at, step, span))).collect()
     }
 
     fn label(self, at: i64, step: i64, span: (i64, i64)) -> String {
-        let local = at + self.ahead(at);
+        let local = at + self.utc_offset(at);
         if let (TimeAxis::Elapsed, true) = (self, span.1 < LONG_TIME) {
             let digits = (0..6).find(|digits| step % 10i64.pow(6 - digits) == 0).unwrap_or(6);
             return format!("{:.*}", digits as usize, local as f64 / 1e6);
@@ -82,15 +82,15 @@ impl TimeAxis {
         let TimeAxis::Clock(_) = self else {
             return if span.1 < LONG_TIME { "elapsed [s]" } else { "elapsed [h:min:s]" }.to_owned();
         };
-        let ahead = self.ahead(span.0);
-        let minutes = ahead.abs() / SECOND / 60;
-        let sign = if ahead < 0 { '-' } else { '+' };
+        let utc_offset = self.utc_offset(span.0);
+        let minutes = utc_offset.abs() / SECOND / 60;
+        let sign = if utc_offset < 0 { '-' } else { '+' };
         let zone = match minutes {
             0 => "UTC".to_owned(),
             _ => format!("UTC{sign}{:02}:{:02}", minutes / 60, minutes % 60),
         };
-        let local = span.0 + ahead;
-        // Labels below a second have no hours.
+        let local = span.0 + utc_offset;
+        // Labels with fractions of a second have no hours.
         let hour = if span.1 - span.0 < 10 * SECOND { hour(local) } else { String::new() };
         format!("{}{hour}, {zone}", date(local))
     }
@@ -111,29 +111,29 @@ fn hour(local: i64) -> String {
     format!(" {} h", moment(local).get(11..13).unwrap_or_default())
 }
 
-/// A range with space above and below.
+/// Adds space above and below a range.
 pub(super) fn with_margins((low, high): (f64, f64)) -> (f64, f64) {
     let margin = match high - low {
         0.0 if low == 0.0 => 1.0,
         0.0 => low.abs() * 0.05,
         size => size * 0.05,
     };
-    // Values close to the largest number have no space.
+    // If the values are close to the largest number, the margins would be infinite.
     let range = (low - margin, high + margin);
     if (range.1 - range.0).is_finite() { range } else { (f64::MIN / 4.0, f64::MAX / 4.0) }
 }
 
-/// At most `most` ticks with their labels.
-pub(super) fn value_ticks((low, high): (f64, f64), most: usize) -> Vec<(f64, String)> {
-    let rough = (high - low) / most.max(1) as f64;
+/// Returns ticks with their labels, with at most `max_intervals` intervals between the ticks.
+pub(super) fn value_ticks((low, high): (f64, f64), max_intervals: usize) -> Vec<(f64, String)> {
+    let rough = (high - low) / max_intervals.max(1) as f64;
     let power = rough.log10().floor();
     let step = [1.0, 2.0, 5.0, 10.0].map(|digit| digit * 10f64.powf(power)).into_iter().find(|step| *step >= rough);
     let step = step.unwrap_or(rough);
     let magnitude = step.log10().floor();
     let first = (low / step).ceil();
-    let ticks = (0..=most).map(|count| (first + count as f64) * step).take_while(|value| *value <= high);
+    let ticks = (0..=max_intervals).map(|count| (first + count as f64) * step).take_while(|value| *value <= high);
     let label = |value: f64| {
-        // -0 is 0.
+        // Prints 0 instead of -0.
         let value = if value.abs() < step / 2.0 { 0.0 } else { value };
         match magnitude {
             ..-6.0 => format!("{value:.3e}"),
@@ -176,10 +176,10 @@ mod tests {
     #[test]
     fn round_times() {
         let (start, hour) = (1_700_000_000 * SECOND, 3600 * SECOND);
-        let ahead: Zone = |_| 3600 * SECOND + 1800 * SECOND;
+        let utc_offset: Zone = |_| 3600 * SECOND + 1800 * SECOND;
         assert_eq!(labels(TimeAxis::Clock(|_| 0), (start, start + hour)), ["22:15", "22:30", "22:45", "23:00"]);
-        assert_eq!(labels(TimeAxis::Clock(ahead), (start, start + hour))[0], "23:45");
-        assert_eq!(TimeAxis::Clock(ahead).caption((start, start + hour)), "2023-11-14, UTC+01:30");
+        assert_eq!(labels(TimeAxis::Clock(utc_offset), (start, start + hour))[0], "23:45");
+        assert_eq!(TimeAxis::Clock(utc_offset).caption((start, start + hour)), "2023-11-14, UTC+01:30");
         let week = labels(TimeAxis::Clock(|_| 0), (start, start + 7 * 24 * hour));
         assert_eq!(week, ["11-15", "11-17", "11-19", "11-21"]);
         let days = labels(TimeAxis::Clock(|_| 0), (start, start + 30 * hour));

@@ -4,8 +4,8 @@ use super::{Plot, Point};
 use crate::measure::sample::Status;
 use crate::output::recording::MARKED;
 
-/// The positions of marks, at least `distance` columns apart for each status. A mark without a value has the value
-/// before it.
+/// Returns status, column and value of the marks. Marks of the same status are at least `distance` columns apart. A
+/// mark without a value gets the previous value.
 pub(super) fn marks(points: &[Point], x: impl Fn(i64) -> f64, distance: f64) -> Vec<(Status, f64, f64)> {
     let mut marks = Vec::new();
     let mut last = MARKED.map(|_| f64::NEG_INFINITY);

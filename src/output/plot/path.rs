@@ -32,8 +32,8 @@ impl Reduced {
     }
 }
 
-/// The connected parts of a curve. `x` is the column of a time. A gap or a missing value is shown only if it is as wide
-/// as a column.
+/// Returns the connected parts of a curve. `x` converts a time to a column. A gap or a missing value is shown only if
+/// it is at least one column wide.
 pub(super) fn paths(points: &[Point], x: impl Fn(i64) -> f64) -> Vec<Vec<(f64, f64)>> {
     let (mut paths, mut path, mut open) = (Vec::new(), Vec::new(), None::<Reduced>);
     let mut is_broken = false;
@@ -66,7 +66,7 @@ pub(super) fn paths(points: &[Point], x: impl Fn(i64) -> f64) -> Vec<Vec<(f64, f
     paths
 }
 
-/// The drawn parts of a dashed line. `pattern` has the lengths of lines and spaces in turn.
+/// Returns the drawn parts of a dashed line. `pattern` alternates the lengths of dashes and spaces.
 pub(super) fn dashes(path: &[(f64, f64)], pattern: &[f64]) -> Vec<Vec<(f64, f64)>> {
     let Some(&first) = path.first().filter(|_| !pattern.is_empty()) else { return vec![path.to_vec()] };
     let (mut drawn, mut part) = (Vec::new(), vec![first]);

@@ -16,7 +16,7 @@ const FONT: RasterHeight = RasterHeight::Size24;
 /// Pixels from the top of a character to its base line.
 const BASE_LINE: f64 = 18.0;
 
-/// The plot as a PNG file.
+/// Draws the plot as a PNG file.
 ///
 /// # Errors
 /// The plot is too large.
@@ -37,7 +37,7 @@ fn scaled(points: &[Position]) -> Vec<Position> {
     points.iter().map(|(x, y)| (x * SCALE, y * SCALE)).collect()
 }
 
-/// A whole number of pixels.
+/// Rounds a length up to whole pixels.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn pixels(length: f64) -> usize {
     // The cast saturates.
@@ -72,13 +72,13 @@ impl Image {
         }
     }
 
-    /// Draws a line with round corners and ends. A pixel has the share of the nearest part of the line.
+    /// Draws a line with round corners and ends. The share of the colour in a pixel is that of the nearest segment.
     fn line(&mut self, points: &[Position], color: Color, width: f64) {
         let radius = width / 2.0;
         let Some((left, right)) = bounds(points.iter().map(|point| point.0), radius, self.width) else { return };
         let Some((top, bottom)) = bounds(points.iter().map(|point| point.1), radius, self.height) else { return };
-        let across = right - left;
-        let mut shares = vec![0f32; across * (bottom - top)];
+        let row_length = right - left;
+        let mut shares = vec![0f32; row_length * (bottom - top)];
         let ends = [points[0], points[0]];
         let segments = points.windows(2).chain((points.len() == 1).then_some(&ends[..]));
         for segment in segments {
@@ -90,13 +90,13 @@ impl Image {
                     let distance = distance((x as f64 + 0.5, y as f64 + 0.5), from, to);
                     #[allow(clippy::cast_possible_truncation)]
                     let share = (radius + 0.5 - distance).clamp(0.0, 1.0) as f32;
-                    let kept = &mut shares[(y - top) * across + x - left];
+                    let kept = &mut shares[(y - top) * row_length + x - left];
                     *kept = kept.max(share);
                 }
             }
         }
         for (at, share) in shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
-            self.mix(left + at % across, top + at / across, color, f64::from(share));
+            self.mix(left + at % row_length, top + at / row_length, color, f64::from(share));
         }
     }
 
@@ -163,9 +163,9 @@ impl Image {
     }
 }
 
-/// The first pixel that a line touches, and the pixel after the last. `None` if it is outside.
-fn bounds(places: impl Iterator<Item = f64> + Clone, radius: f64, end: usize) -> Option<(usize, usize)> {
-    let (low, high) = (places.clone().fold(f64::INFINITY, f64::min), places.fold(f64::NEG_INFINITY, f64::max));
+/// Returns the first pixel that a line touches, and the pixel after the last one. `None` if the line is outside.
+fn bounds(positions: impl Iterator<Item = f64> + Clone, radius: f64, end: usize) -> Option<(usize, usize)> {
+    let (low, high) = (positions.clone().fold(f64::INFINITY, f64::min), positions.fold(f64::NEG_INFINITY, f64::max));
     let first = pixels((low - radius - 1.0).max(0.0)).min(end);
     let last = pixels((high + radius + 1.0).max(0.0)).min(end);
     (low <= high && first < last).then_some((first, last))

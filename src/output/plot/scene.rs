@@ -36,7 +36,7 @@ pub(super) struct Scene {
     pub(super) shapes: Vec<Shape>,
 }
 
-/// The width of a character. Texts are measured before they are drawn, so this is the width of the widest font in use.
+/// The assumed width of a character: its width in the widest font in use. The font is unknown when a text is placed.
 pub(super) const CHARACTER: f64 = 7.0;
 
 /// The distance of two lines of text.
@@ -45,10 +45,10 @@ const LINE: f64 = 16.0;
 const WIDTH: f64 = 1000.0;
 const EDGE: f64 = 12.0;
 
-/// The heights of the plots with one, two and more panels.
+/// The height of a panel if the plot has one, two, or more panels.
 const HEIGHTS: [f64; 3] = [360.0, 240.0, 170.0];
 
-/// The length of the lines from a curve to its label, and of the sample of its line.
+/// The length of the line from a curve to its label, and of the line sample before the label.
 const LEADER: f64 = 12.0;
 const SAMPLE: f64 = 30.0;
 
@@ -95,13 +95,13 @@ fn whole(number: f64) -> usize {
     number as usize
 }
 
-/// Makes a text fit into a number of characters.
-pub(super) fn shortened(text: &str, most: usize) -> String {
+/// Shortens a text to at most `max_length` characters.
+pub(super) fn shortened(text: &str, max_length: usize) -> String {
     let text = crate::output::text::safe(text);
-    if text.chars().count() <= most {
+    if text.chars().count() <= max_length {
         return text;
     }
-    text.chars().take(most.saturating_sub(1)).chain(['~']).collect()
+    text.chars().take(max_length.saturating_sub(1)).chain(['~']).collect()
 }
 
 impl Scene {
@@ -114,7 +114,7 @@ impl Scene {
         let left = EDGE + widest as f64 * CHARACTER + 8.0;
         let labels = plot.panels.iter().filter(|panel| panel.curves.len() > 1).flat_map(|panel| &panel.curves);
         let label = labels.map(|curve| shortened(&curve.label, MAX_LABEL).chars().count()).max();
-        let beside = label.map_or(2.0 * EDGE, |label| LEADER + SAMPLE + 6.0 + label as f64 * CHARACTER + EDGE);
+        let right_margin = label.map_or(2.0 * EDGE, |label| LEADER + SAMPLE + 6.0 + label as f64 * CHARACTER + EDGE);
         let mut top = EDGE + LINE;
         scene.text((left, top - 4.0), Anchor::Start, &shortened(&plot.title, whole((WIDTH - left) / CHARACTER)));
         if !plot.events.is_empty() {
@@ -124,12 +124,12 @@ impl Scene {
         for (panel, ticks) in plot.panels.iter().zip(&ticks) {
             top += LINE + 4.0;
             let bottom = top + height.max(panel.curves.len() as f64 * LINE);
-            let frame = Frame { left, right: WIDTH - beside, top, bottom };
+            let frame = Frame { left, right: WIDTH - right_margin, top, bottom };
             scene.text((left, top - 5.0), Anchor::Start, &shortened(&panel.heading, 100));
             scene.panel(plot, panel, ticks, frame);
             top = bottom + 8.0;
         }
-        let frame = Frame { left, right: WIDTH - beside, top: first, bottom: top - 8.0 };
+        let frame = Frame { left, right: WIDTH - right_margin, top: first, bottom: top - 8.0 };
         scene.time_axis(plot, frame);
         scene.events(plot, frame);
         scene.height = scene.legend(plot, (left, frame.bottom + 3.0 * LINE)) + EDGE;
@@ -183,7 +183,7 @@ impl Scene {
         }
     }
 
-    /// The names of the curves, each beside the end of its curve.
+    /// Draws the name of each curve next to the end of the curve.
     fn labels(&mut self, panel: &Panel, ends: &[f64], frame: Frame) {
         let wanted: Vec<f64> = ends.iter().map(|end| end - frame.top).collect();
         let places = spread(&wanted, LINE - 2.0, frame.bottom - frame.top);
@@ -236,10 +236,10 @@ impl Scene {
         self.text((middle, frame.bottom + 2.0 * LINE), Anchor::Middle, &plot.axis.caption(plot.span));
     }
 
-    /// A line through all panels for each event, and its word if there is room.
+    /// Draws a line through all panels for each event, and the name of the event if there is room.
     fn events(&mut self, plot: &Plot, frame: Frame) {
         let top = frame.top - LINE - 8.0;
-        let (mut free, mut last) = (0.0, f64::NEG_INFINITY);
+        let (mut free_from, mut last) = (0.0, f64::NEG_INFINITY);
         for event in &plot.events {
             let x = frame.x(plot.place(event.at));
             if x - last < 1.0 {
@@ -251,14 +251,14 @@ impl Scene {
             }
             let label = event.node.map_or_else(|| event.event.clone(), |node| format!("{} {node}", event.event));
             let half = (label.chars().count() as f64 + 1.0) * CHARACTER / 2.0;
-            if x - half >= free {
+            if x - half >= free_from {
                 self.text((x, top - 3.0), Anchor::Middle, &label);
-                free = x + half;
+                free_from = x + half;
             }
         }
     }
 
-    /// The marks and events in words. Returns the lower edge.
+    /// Draws the legend of marks and events. Returns its lower edge.
     fn legend(&mut self, plot: &Plot, (left, y): Position) -> f64 {
         let statuses = plot.statuses();
         let mut x = left;

@@ -4,7 +4,7 @@ use super::Plot;
 use super::scene::{Anchor, Color, Position, Scene, Shape};
 use std::fmt::Write;
 
-/// The plot as an SVG file.
+/// Draws the plot as an SVG file.
 pub fn svg(plot: &Plot) -> String {
     let Scene { title, width, height, shapes } = Scene::new(plot);
     let mut out = format!(
@@ -39,7 +39,7 @@ pub fn svg(plot: &Plot) -> String {
     out + "</svg>\n"
 }
 
-/// A single point is a line of no length: its round ends are a dot.
+/// Returns the data of a path. A single point becomes a line of length 0: its round ends look like a dot.
 fn path(points: &[Position]) -> String {
     let mut path = String::new();
     for (at, (x, y)) in points.iter().enumerate() {

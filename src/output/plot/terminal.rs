@@ -9,7 +9,7 @@ use crate::measure::sample::Status;
 use anstyle::{Ansi256Color, AnsiColor, Style};
 use std::io::{self, Write};
 
-/// The widths of a terminal that a plot can have.
+/// The possible widths of a plot in characters.
 const WIDTHS: std::ops::RangeInclusive<usize> = 40..=400;
 
 /// The rows of a single panel, and of each panel if there are several.
@@ -18,17 +18,17 @@ const ROWS: [usize; 2] = [12, 8];
 /// The longest label of a curve.
 const MAX_LABEL: usize = 20;
 
-/// The names of curves in the plot.
+/// The one-character names of the curves in the plot.
 const NAMES: &[u8] = b"123456789abcdefghijklmnopqrstuvwxyz";
 
 /// Colours that are visible on a light and on a dark background, and that colour-blind people can distinguish.
 const COLORS: [u8; 7] = [32, 166, 35, 169, 136, 37, 97];
 
-/// One character.
+/// One character of a panel.
 #[derive(Clone, Copy, Default)]
 struct Character {
     dots: u8,
-    /// A character instead of dots.
+    /// A character that is shown instead of the dots.
     mark: Option<char>,
     style: Style,
 }
@@ -91,7 +91,7 @@ fn whole(number: f64) -> usize {
     number as usize
 }
 
-/// The place of the panels between their labels.
+/// The widths of a line: value labels (`left`), curves (`columns`), and names of curves (`label`).
 struct Frame {
     left: usize,
     columns: usize,
@@ -101,7 +101,7 @@ struct Frame {
 /// Writes the plot for a terminal of this width.
 ///
 /// # Errors
-/// Those of `out`.
+/// `out` cannot be written.
 pub fn terminal(plot: &Plot, width: usize, out: &mut dyn Write) -> io::Result<()> {
     let width = width.clamp(*WIDTHS.start(), *WIDTHS.end());
     let rows = ROWS[usize::from(plot.panels.len() > 1)];
@@ -109,9 +109,9 @@ pub fn terminal(plot: &Plot, width: usize, out: &mut dyn Write) -> io::Result<()
     let left = ticks.iter().flatten().map(|(_, label)| label.len()).max().unwrap_or(0);
     let several = plot.panels.iter().filter(|panel| panel.curves.len() > 1).flat_map(|panel| &panel.curves);
     let label = several.map(|curve| curve.label.chars().count()).max().unwrap_or(0).min(MAX_LABEL).min(width / 4);
-    // A space, the name of the curve and another space are before the label.
-    let beside = if label > 0 { label + 3 } else { 0 };
-    let frame = Frame { left, columns: (width - 1).saturating_sub(left + 2 + beside), label };
+    // Before the label are a space, the one-character name of the curve, and another space.
+    let label_columns = if label > 0 { label + 3 } else { 0 };
+    let frame = Frame { left, columns: (width - 1).saturating_sub(left + 2 + label_columns), label };
     if !plot.title.is_empty() {
         writeln!(out, "{}", shortened(&plot.title, width - 1))?;
     }
@@ -173,7 +173,7 @@ fn panel(
     Ok(())
 }
 
-/// The curves, and the row of the last value of each.
+/// Draws the curves. Also returns the row of the last value of each curve.
 fn draw(plot: &Plot, panel: &Panel, rows: usize, columns: usize) -> (Canvas, Vec<f64>) {
     let mut canvas = Canvas { columns, rows, characters: vec![Character::default(); columns * rows] };
     let (width, height) = ((2 * columns) as f64 - 0.01, (4 * rows) as f64 - 0.01);

@@ -113,7 +113,7 @@ fn events_have_their_node_if_any() {
     assert_eq!(read(&[file], TimeBase::Elapsed).0.events, [event(second, None, "link-down")]);
 }
 
-/// The values of a recording with a row every second: `1 gap 2`.
+/// Reads a recording with a row at each of these seconds. Returns the values: `1 gap 2`.
 fn with_gaps(seconds: &[u64]) -> String {
     let row = |second: &u64| format!("{}.0,0,1,pressure,{second},bar,ok,0x00\n", 1_700_000_000 + second);
     let (recording, _) = read(&[&format!("{HEAD}{}", seconds.iter().map(row).collect::<String>())], TimeBase::Clock);
@@ -124,7 +124,7 @@ fn with_gaps(seconds: &[u64]) -> String {
 #[test]
 fn long_intervals_are_gaps() {
     assert_eq!(with_gaps(&[0, 1, 2, 3, 20, 21, 22]), "0 1 2 3 gap 20 21 22");
-    // A sender that becomes slower for good is not a series of gaps.
+    // If a sender becomes slower and stays slower, its intervals are not gaps.
     assert_eq!(with_gaps(&[0, 1, 2, 4, 6, 9, 12, 15]), "0 1 2 4 6 9 12 15");
 }
 
@@ -146,7 +146,7 @@ fn running_recording_keeps_extreme_values_gaps_and_statuses() {
         push(at * 1000, value, if at == 6_666 { Status::OverloadHigh } else { Status::Ok });
     }
     let points = &recording.curves[0].points;
-    assert!(points.len() < MOST_POINTS, "{}", points.len());
+    assert!(points.len() < MAX_POINTS, "{}", points.len());
     assert!(points.contains(&Point { at: 5_555_000, value: 99.0, status: None }));
     assert!(points.iter().any(|point| point.at == 6_666_000 && point.status == Some(Status::OverloadHigh)));
     assert!(points.iter().any(|point| point.value.is_nan() && point.at == 150_001_000));

@@ -52,7 +52,7 @@ impl Cell {
         Cell::Shown(Box::new(self), text.into())
     }
 
-    /// Texts as a list.
+    /// A list of values.
     pub fn list<C: Into<Cell>>(items: impl IntoIterator<Item = C>) -> Cell {
         Cell::List(items.into_iter().map(Into::into).collect())
     }
@@ -196,7 +196,7 @@ impl From<Raw> for Cell {
 }
 
 impl From<Unit> for Cell {
-    /// The unit's symbol. A quantity without a unit has no symbol.
+    /// The symbol of the unit; no value if the symbol is empty.
     fn from(unit: Unit) -> Cell {
         unit.to_string().into()
     }
