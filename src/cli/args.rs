@@ -175,7 +175,7 @@ impl fmt::Display for ObjectArg {
     }
 }
 
-/// The bus of `--bus`.
+/// The value of `--bus`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BusSpec {
     /// A SocketCAN interface.

@@ -254,8 +254,8 @@ fn names(line: &[String], global: &Global) -> BTreeMap<String, String> {
             WordKind::Device => plain(device_names().collect()),
             WordKind::Words(words) => plain(words.iter().map(ToString::to_string).collect()),
             WordKind::Name(with_objects) => {
-                let own = positional.first().filter(|_| path == ["objects"]).map(|device| (*device, false));
-                let sources = own.into_iter().chain(sources);
+                let device_argument = positional.first().filter(|_| path == ["objects"]).map(|device| (*device, false));
+                let sources = device_argument.into_iter().chain(sources);
                 let models: Vec<_> = sources.filter_map(|(file, is_eds)| model(file, is_eds, global)).collect();
                 plain(names_of(&models, with_objects))
             }

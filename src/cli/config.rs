@@ -155,7 +155,7 @@ fn mistakes(file: &str, mistakes: Vec<Mistake>) -> anyhow::Error {
     }
 }
 
-/// Returns the device that the file names in `device.kind`, as described. `None` if the kind is missing or unknown.
+/// Returns the device named in `device.kind`, according to its description. `None` if the kind is missing or unknown.
 fn described(document: &Document) -> Option<Node> {
     let Item::Text(kind) = &document.get("device.kind")?.value else { return None };
     let model = catalog::by_name(kind)?;

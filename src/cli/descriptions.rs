@@ -77,8 +77,8 @@ pub(super) fn check_pending(master: &mut Master<'_>, global: &Global) -> anyhow:
     }
 }
 
-/// Chooses one description for each node. A description for this node has priority over one for all nodes, and a description
-/// has priority over an EDS.
+/// Chooses one description for each node. A description for this node has priority over a description for all nodes. A
+/// description has priority over an EDS.
 fn combine(named: &[Named], nodes: &[NodeId], mismatches: &Mismatches) -> Overrides {
     let mut overrides = Overrides::new();
     for &node in nodes {
@@ -97,8 +97,8 @@ fn combine(named: &[Named], nodes: &[NodeId], mismatches: &Mismatches) -> Overri
     overrides
 }
 
-/// Compares vendor and product of the files with those of the devices (1018h). Returns the files that are not used,
-/// each with the node.
+/// Compares vendor and product in the files with 1018h of the devices. Returns the files that are not used, each with
+/// its node.
 fn mismatches(
     master: &mut Master<'_>,
     global: &Global,
@@ -133,7 +133,7 @@ fn mismatches(
             continue;
         }
         let message = mismatch(named.file(), **node, device, *vendor, *product);
-        // No description is for a device of this vendor, so the user names the most similar description.
+        // No description exists for this vendor, so the user names the most similar description.
         let is_nearest = named.is_built_in()
             && !vendor.is_some_and(catalog::has_vendor)
             && named.model.has_standard_values()
@@ -219,7 +219,7 @@ pub(super) fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result
     Ok(Arc::new(model))
 }
 
-/// The text of a file.
+/// Converts the bytes of a file to text.
 ///
 /// # Errors
 /// The text is not UTF-8; the error contains the line.
@@ -231,7 +231,7 @@ pub(super) fn text(name: &str, bytes: Vec<u8>) -> Result<String, ErrorMessage> {
     })
 }
 
-/// An EDS or DCF file.
+/// Reads an EDS or DCF file, and prints its warnings.
 pub(super) fn eds(name: &str, global: &Global) -> anyhow::Result<eds::Eds> {
     Ok(eds_of(name, &read_file(name)?, global)?)
 }
@@ -254,14 +254,14 @@ fn eds_of(name: &str, bytes: &[u8], global: &Global) -> Result<eds::Eds, ErrorMe
     Ok(eds)
 }
 
-/// The error for an unknown description.
+/// Returns the error for an unknown description.
 pub(super) fn unknown(name: &str) -> ErrorMessage {
     let names: Vec<&str> = catalog::all().map(|model| model.description.name.as_str()).collect();
     let hint = format!("built-in devices: {}; or name a file", names.join(", "));
     ErrorMessage::usage(format!("no built-in device \"{name}\"")).hint(hint)
 }
 
-/// The bytes of a file that the user named.
+/// Reads the bytes of a file that the user named.
 pub(super) fn read_file(name: &str) -> Result<Vec<u8>, FileError> {
     let mut bytes = Vec::new();
     let read = File::open(name).and_then(|file| file.take(MAX_FILE).read_to_end(&mut bytes));

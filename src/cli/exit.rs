@@ -36,7 +36,7 @@ pub(super) struct Messages {
     pub(super) messages: Vec<ErrorMessage>,
 }
 
-/// The result of a command for several nodes: success if no node failed.
+/// Returns the result of a command for several nodes: success if no node failed.
 ///
 /// # Errors
 /// The failures. [`combined`] determines the kind.
@@ -264,7 +264,7 @@ pub(super) fn stdout(error: io::Error) -> anyhow::Error {
 
 /// Converts errors of the layers below to a [`Failure`].
 pub(super) trait IntoFailure<T> {
-    /// The same result with its error as a [`Failure`].
+    /// Converts the error of the result to a [`Failure`].
     fn or_fail(self) -> Result<T, Failure>;
 }
 

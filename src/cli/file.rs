@@ -108,7 +108,7 @@ impl OutFile {
         Ok(lines)
     }
 
-    /// The target for a writer. The first `keep` bytes of the file stay, and the rest is replaced.
+    /// Returns the target for a writer. The first `keep` bytes of the file stay, and the rest is replaced.
     pub(super) fn target(&self, keep: u64) -> anyhow::Result<OutputTarget> {
         let file = self.file.try_clone().map_err(|source| self.error(source))?;
         Ok(if self.is_own_stream {
@@ -188,7 +188,7 @@ impl ReportFile {
         let file = loop {
             let file = options.open(&temporary).map_err(|source| file_error("create", &path, source))?;
             lock_output(&file, &path)?;
-            // Another program may have completed its report between the two calls.
+            // Another program may have renamed the file between the open and the lock.
             let is_same = |now: &fs::Metadata| file.metadata().is_ok_and(|own| is_same(&own, now));
             if cfg!(not(unix)) || temporary.metadata().is_ok_and(|now| is_same(&now)) {
                 break file;

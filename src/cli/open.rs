@@ -195,22 +195,22 @@ fn within<T, E>(
     mut attempt: impl FnMut() -> Result<T, E>,
     obstacle: impl Fn(&E) -> Option<String>,
 ) -> anyhow::Result<Result<T, E>> {
-    let mut left = global.wait.map_or(Duration::ZERO, |wait| wait.0);
+    let mut remaining = global.wait.map_or(Duration::ZERO, |wait| wait.0);
     let mut interrupts = None;
     loop {
         let result = attempt();
-        let Some(reason) = result.as_ref().err().and_then(&obstacle).filter(|_| !left.is_zero()) else {
+        let Some(reason) = result.as_ref().err().and_then(&obstacle).filter(|_| !remaining.is_zero()) else {
             return Ok(result);
         };
         if interrupts.is_none() {
-            global.console().note(&format!("{reason}; waiting up to {}", format_duration(left)));
+            global.console().note(&format!("{reason}; waiting up to {}", format_duration(remaining)));
             interrupts = Some(self::interrupts()?);
         }
-        let pause = left.min(WAIT_INTERVAL);
+        let pause = remaining.min(WAIT_INTERVAL);
         if interrupts.as_mut().is_some_and(|interrupts| interrupts.wait_for(pause)) {
             return Err(Failure::from(Error::Interrupted).into());
         }
-        left -= pause;
+        remaining -= pause;
     }
 }
 

@@ -17,8 +17,8 @@ const MAX_FILE: u64 = 16 << 20;
 fn folders() -> Vec<PathBuf> {
     let path = |name: &str| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let config = path("XDG_CONFIG_HOME").or_else(|| Some(path("HOME")?.join(".config")));
-    let own = config.map(|config| config.join("cangauge/devices"));
-    own.into_iter().chain([PathBuf::from("/usr/share/cangauge/devices")]).collect()
+    let user_folder = config.map(|config| config.join("cangauge/devices"));
+    user_folder.into_iter().chain([PathBuf::from("/usr/share/cangauge/devices")]).collect()
 }
 
 /// Reads the descriptions. Returns the mistakes of unusable files.

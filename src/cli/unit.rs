@@ -36,11 +36,11 @@ impl Unit {
     }
 
     pub(super) fn writes(&self) -> bool {
-        self.words().is_ok_and(|(_, unit)| unit.is_some())
+        self.signal_and_unit().is_ok_and(|(_, unit)| unit.is_some())
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let (signal, unit) = self.words().map_err(ErrorMessage::usage)?;
+        let (signal, unit) = self.signal_and_unit().map_err(ErrorMessage::usage)?;
         let Some(unit) = unit else {
             let each = on_channels(
                 global,
@@ -63,7 +63,7 @@ impl Unit {
     }
 
     /// Returns signal and unit. A single word is a unit if it is the name of a unit, otherwise a signal.
-    fn words(&self) -> Result<(Option<&str>, Option<Code>), String> {
+    fn signal_and_unit(&self) -> Result<(Option<&str>, Option<Code>), String> {
         match self.words.as_slice() {
             [] => Ok((None, None)),
             [word] => match parse_unit(word) {

@@ -26,7 +26,7 @@ pub struct FindingReport {
 impl FindingReport {
     /// Converts a finding to text. `interface` is the name of the bus.
     pub fn new(finding: &Finding, interface: &str) -> FindingReport {
-        let (word, message, hint) = words(finding, interface);
+        let (word, message, hint) = finding_text(finding, interface);
         FindingReport { node: finding.node, signal: finding.signal.clone(), finding: word, message, hint }
     }
 
@@ -72,16 +72,16 @@ impl Report for FindingReport {
 }
 
 /// The word for scripts, the message and the hint.
-type Words = (&'static str, String, Option<String>);
+type FindingText = (&'static str, String, Option<String>);
 
-fn words(finding: &Finding, interface: &str) -> Words {
+fn finding_text(finding: &Finding, interface: &str) -> FindingText {
     let node = finding.node.map(|node| node.to_string()).unwrap_or_default();
     let without_node = |text: String| text.strip_prefix(&format!("node {node}: ")).map(str::to_owned).unwrap_or(text);
     let errors = || Some(format!("cangauge errors {node}"));
     match &finding.cause {
         FindingCause::Failed(failure) => {
-            let words = ErrorMessage::of(failure);
-            (super::failure::kind_name(words.kind), without_node(words.message), words.hint)
+            let error = ErrorMessage::of(failure);
+            (super::failure::kind_name(error.kind), without_node(error.message), error.hint)
         }
         FindingCause::Silent(silence) => {
             let hint = finding.node.and_then(|node| diagnosis::hint(silence, node, &format!("cangauge log {node}")));
@@ -116,13 +116,13 @@ fn words(finding: &Finding, interface: &str) -> Words {
             (word, without_node(remark_text(remark)), None)
         }
         FindingCause::NoFrame(_) | FindingCause::NoNode | FindingCause::Unconfigured | FindingCause::Fault(..) => {
-            bus_words(&finding.cause, interface)
+            bus_text(&finding.cause, interface)
         }
     }
 }
 
-/// The words for findings about the bus.
-fn bus_words(cause: &FindingCause, interface: &str) -> Words {
+/// Returns the text of a finding about the bus.
+fn bus_text(cause: &FindingCause, interface: &str) -> FindingText {
     let detect = format!("find the bit rate: cangauge bus detect {interface}");
     match cause {
         FindingCause::NoFrame(time) => {
@@ -138,7 +138,7 @@ fn bus_words(cause: &FindingCause, interface: &str) -> Words {
             let message = "no node answers, but a device without a node-ID is on the bus".to_owned();
             ("unconfigured", message, Some("cangauge lss scan".to_owned()))
         }
-        FindingCause::Fault(fault, is_answered) => fault_words(*fault, *is_answered, detect),
+        FindingCause::Fault(fault, is_answered) => fault_text(*fault, *is_answered, detect),
         _ => {
             let message = "frames are received, but no CANopen node answers".to_owned();
             ("no-node", message, Some("show the frames: candump, or cangauge scan --passive --trace -".to_owned()))
@@ -146,7 +146,7 @@ fn bus_words(cause: &FindingCause, interface: &str) -> Words {
     }
 }
 
-fn fault_words(fault: Fault, is_answered: bool, detect: String) -> Words {
+fn fault_text(fault: Fault, is_answered: bool, detect: String) -> FindingText {
     let (word, hint) = match fault {
         Fault::NoAcknowledge => {
             ("no-acknowledge", Some("check the power, the cable, the terminators and the bit rate".to_owned()))

@@ -3,7 +3,7 @@
 use crate::bus::{Mono, Stamp};
 use std::time::Duration;
 
-/// The wall clock was set if wall and monotonic time between two rows differ by more than this.
+/// If wall and monotonic time between two rows differ by more than this, the wall clock was set.
 const CLOCK_STEP_US: i128 = 10_000;
 
 /// Measures the time since the first row.

@@ -10,7 +10,7 @@ use std::time::Duration;
 pub(super) use text::left_operational;
 pub use text::{event_text, heartbeat_text, remark_text, two_senders};
 
-/// The columns.
+/// The columns of the CSV file.
 pub const COLUMNS: [&str; 5] = ["time", "elapsed_s", "node", "event", "text"];
 
 /// The importance of an event.
@@ -123,7 +123,7 @@ impl Events {
         self.writer.finish(give_up)
     }
 
-    /// Changes of the file by other programs since the last call.
+    /// Returns the changes of the file by other programs since the last call.
     pub fn take_changes(&mut self) -> Vec<FileChange> {
         self.writer.take_changes()
     }

@@ -1,4 +1,4 @@
-//! The figures of `health`.
+//! The report of `health`.
 
 use super::report::{Cell, Column, Report};
 use super::{table, text};
@@ -42,7 +42,7 @@ impl Report for Figure {
         ]
     }
 
-    /// The bus in a few lines, the nodes as a table, then the figures above their limits.
+    /// Writes the bus in a few lines, the nodes as a table, and then a warning for each figure above its limit.
     fn text(figures: &[Figure], out: &mut dyn Write) -> io::Result<()> {
         let texts = FigureTexts(figures);
         texts.bus(out)?;

@@ -91,7 +91,7 @@ pub(super) fn date(Date { parts: [year, month, day] }: &Date) -> String {
     }
 }
 
-/// How the loss of the device is detected.
+/// Describes how the loss of the device is detected.
 pub(super) fn monitoring(Monitoring { heartbeat_ms, guarding_ms }: Monitoring) -> String {
     match (heartbeat_ms, guarding_ms) {
         (0, (_, 0)) => "none".to_owned(),

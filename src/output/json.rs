@@ -11,8 +11,8 @@ pub(super) fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<
     out.write_all(b"\n")
 }
 
-/// Escapes more characters than JSON requires, because JSON Lines are also shown in terminals. Besides characters below
-/// 20h, 9Bh also starts a control sequence.
+/// Escapes more characters than JSON requires, because JSON Lines are also shown in terminals. For example, the
+/// character 9Bh starts a control sequence.
 struct Safe;
 
 impl Formatter for Safe {

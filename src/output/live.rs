@@ -33,13 +33,13 @@ pub struct LiveCounts {
     pub rows: u64,
     /// The planned number of rows.
     pub count: Option<u64>,
-    /// Rows in the last second.
+    /// The rate of rows, measured over at least one second.
     pub rows_per_second: f64,
     /// Rows and frames that were lost.
     pub lost: u64,
     /// The gaps.
     pub gaps: u64,
-    /// The file of the rows.
+    /// The name of the file with rows.
     pub file: String,
 }
 
@@ -267,7 +267,7 @@ fn compact(signals: &[&LiveSignal], now: Mono, in_line: usize) -> Vec<Line> {
             };
             line.extend([("  ".to_owned(), Style::new()), (format!("{value:<width$}"), style)]);
         }
-        // The first status that is not ok, with its signal.
+        // Of several signals, only the first status that is not ok is shown.
         let worst = chunk.iter().find(|signal| signal.status.is_some_and(|status| status != Status::Ok));
         let (text, style) = status(worst.unwrap_or(&chunk[0]).status);
         let text = worst.map_or_else(|| text.to_owned(), |signal| format!("{} {text}", signal.name));
@@ -314,10 +314,10 @@ fn length(line: &Line) -> usize {
 /// The text of a line, at most `width` characters, with its styles if `color`. A cut line ends with `…`.
 fn cut(line: Line, width: usize, color: bool) -> String {
     let is_cut = length(&line) > width;
-    let (mut text, mut left) = (String::new(), width.saturating_sub(usize::from(is_cut)));
+    let (mut text, mut remaining) = (String::new(), width.saturating_sub(usize::from(is_cut)));
     for (part, style) in line {
-        let part: String = part.chars().take(left).collect();
-        left -= part.chars().count();
+        let part: String = part.chars().take(remaining).collect();
+        remaining -= part.chars().count();
         if color && style != Style::new() && !part.is_empty() {
             text.push_str(&format!("{style}{part}{style:#}"));
         } else {

@@ -56,7 +56,7 @@ impl Report for Entry {
             self.id.map(|id| Cell::cob_id(id.number())).into(),
             if raw.is_empty() { Cell::Null } else { text::wire_bytes(raw).into() },
             Cell::List(samples(&self.content).iter().map(sample).collect()),
-            words(self).into(),
+            entry_text(self).into(),
         ]
     }
 
@@ -71,12 +71,12 @@ impl Report for Entry {
             Content::Sdo(_) | Content::Tpdo(..) | Content::WrongLength(..) | Content::Pdo(..) => event(&self.content),
             _ => self.kind.as_str().to_owned(),
         };
-        let line = format!("{}  {node:<9}  {heading:<9}  {}", text::utc(self.at), words(self));
+        let line = format!("{}  {node:<9}  {heading:<9}  {}", text::utc(self.at), entry_text(self));
         writeln!(out, "{}", text::safe(line.trim_end()))
     }
 }
 
-/// The totals in one line: the number of all frames, of the frames of each kind, and of the frames that were not shown.
+/// Returns the totals in one line: all frames, the frames of each kind, and the repetitions that were not shown.
 pub fn totals(report: &MonitorReport) -> String {
     let frames: u64 = report.frames.values().sum();
     let kinds: Vec<String> =
@@ -131,7 +131,7 @@ fn event(content: &Content) -> String {
 }
 
 /// The content in words.
-fn words(entry: &Entry) -> String {
+fn entry_text(entry: &Entry) -> String {
     let bytes = || text::spaced_bytes(&entry.data);
     let id = || entry.id.map(|id| format!("0x{id}")).unwrap_or_default();
     match &entry.content {
@@ -141,8 +141,8 @@ fn words(entry: &Entry) -> String {
         Content::GuardingRequest => "request".to_owned(),
         Content::Guarded(state, true) => state.to_string(),
         Content::Guarded(state, false) => format!("{state}; the toggle bit has not alternated"),
-        Content::Emergency(emergency, meaning) => emergency_words(*emergency, meaning),
-        Content::Sdo(message) => sdo_words(message),
+        Content::Emergency(emergency, meaning) => emergency_text(*emergency, meaning),
+        Content::Sdo(message) => sdo_text(message),
         Content::SecondMaster => "two masters use the SDO channel at the same time".to_owned(),
         Content::Lss(message) => lss::words(message),
         Content::Sync(counter) => counter.map(|counter| format!("counter {counter}")).unwrap_or_default(),
@@ -174,7 +174,7 @@ pub(super) fn command_text(command: NmtCommand) -> &'static str {
     }
 }
 
-fn emergency_words(emergency: Emergency, meaning: &str) -> String {
+fn emergency_text(emergency: Emergency, meaning: &str) -> String {
     if emergency.code == 0 && emergency.register.is_none_or(|register| register.0 == 0) {
         return "0000h emergency over".to_owned();
     }
@@ -185,7 +185,7 @@ fn emergency_words(emergency: Emergency, meaning: &str) -> String {
     format!("{text} ({})", text::spaced_bytes(&emergency.manufacturer))
 }
 
-fn sdo_words(message: &SdoMessage) -> String {
+fn sdo_text(message: &SdoMessage) -> String {
     let transfer = &message.transfer;
     let object = message.name.clone().unwrap_or_else(|| transfer.object.to_string());
     match &transfer.outcome {
@@ -196,7 +196,7 @@ fn sdo_words(message: &SdoMessage) -> String {
                 Some(Err(error)) => format!("; {error}"),
                 None => String::new(),
             };
-            format!("{object} {arrow} {}{note}", value_words(message))
+            format!("{object} {arrow} {}{note}", value_text(message))
         }
         Outcome::Aborted { code, by_master: false } => format!("{object}: rejected: {code}"),
         Outcome::Aborted { code, by_master: true } => format!("{object}: aborted by the master: {code}"),
@@ -207,7 +207,7 @@ fn sdo_words(message: &SdoMessage) -> String {
 }
 
 /// `100 ms`, `5120256 (bar)`, `1234 (1.234 bar)`.
-fn value_words(message: &SdoMessage) -> String {
+fn value_text(message: &SdoMessage) -> String {
     let Some(value) = &message.value else { return String::new() };
     let raw = &message.raw;
     let shown = match value {

@@ -21,7 +21,7 @@ pub struct Written {
     pub lost: u64,
     /// Events that were lost.
     pub events_lost: u64,
-    /// Values that are not in any row of layout `wide`.
+    /// Values that no row of layout `wide` contains.
     pub left_out: u64,
 }
 

@@ -281,8 +281,8 @@ impl Files {
         self.open_events(&mut opened, limit)?;
         let summary = self.summary.as_ref().filter(|path| path.as_path() != Path::new("-"));
         if let Some(path) = summary {
-            let left = limit.map(|limit| limit.saturating_sub(opened.waited));
-            let file = ReportFile::create(path, self.append, left)?;
+            let remaining = limit.map(|limit| limit.saturating_sub(opened.waited));
+            let file = ReportFile::create(path, self.append, remaining)?;
             opened.waited += file.waited;
             opened.summary = Some(file);
         }
@@ -300,8 +300,8 @@ impl Files {
     /// Opens the events file. `limit` is the longest wait for the readers of all FIFOs together.
     fn open_events(&self, opened: &mut OpenFiles, limit: Option<Duration>) -> anyhow::Result<()> {
         let Some(path) = &self.events else { return Ok(()) };
-        let left = limit.map(|limit| limit.saturating_sub(opened.waited));
-        let mut file = OutFile::open(path, self.existing(), left)?;
+        let remaining = limit.map(|limit| limit.saturating_sub(opened.waited));
+        let mut file = OutFile::open(path, self.existing(), remaining)?;
         opened.waited += file.waited;
         opened.existing_events = file.existing_lines()?;
         let expected = Events::header(self.dialect());

@@ -17,7 +17,7 @@ use std::io::{self, Write};
 /// The longest wait for a blocked output after Ctrl-C, in tenths of a second.
 const FLUSH_TIMEOUT: u32 = 20;
 
-/// How writing ended.
+/// The result of writing rows and events.
 pub(super) struct Ended {
     pub(super) written: Written,
     pub(super) unwritten: Option<Unwritten>,
@@ -106,8 +106,8 @@ impl Finished {
         }
     }
 
-    /// Success, or the failures. The first failure decides the exit code; `partial` if only some nodes could not be
-    /// recorded.
+    /// Returns success or the failures. The first failure decides the exit code. It is `partial` if only some nodes could
+    /// not be recorded.
     pub(super) fn result(&self, files: &OpenFiles) -> anyhow::Result<()> {
         let unmet = all_satisfied(&self.verdicts, &[]).err();
         let (failed, without_data) = match unmet {

@@ -17,42 +17,42 @@ use std::time::Duration;
 
 /// Returns the message and the hint for a bus error.
 pub(super) fn bus(error: &BusError) -> CauseText {
-    let words = CauseText::new(error.to_string());
+    let cause_text = CauseText::new(error.to_string());
     match error {
-        BusError::QueueFull => words.hint(
+        BusError::QueueFull => cause_text.hint(
             "no node acknowledges the frames: check the sensor's power, the bit rate, the wiring and the 120 ohm \
              terminators; or the bus is overloaded: candump shows the traffic",
         ),
         // A virtual interface has no bit rate.
         BusError::Down(name) if name.starts_with("vcan") || name.starts_with("vxcan") => {
-            words.hint(format!("bring it up: sudo cangauge bus up {name}"))
+            cause_text.hint(format!("bring it up: sudo cangauge bus up {name}"))
         }
-        BusError::Down(name) if name.contains(':') => words.hint("check the cable, the adapter or the server"),
+        BusError::Down(name) if name.contains(':') => cause_text.hint("check the cable, the adapter or the server"),
         BusError::Down(name) => {
-            words.hint(format!("bring it up: sudo cangauge bus up {name} 250k (use the sensors' bit rate)"))
+            cause_text.hint(format!("bring it up: sudo cangauge bus up {name} 250k (use the sensors' bit rate)"))
         }
-        BusError::Unreachable { name, .. } => words.hint(if name.starts_with("socketcand") {
+        BusError::Unreachable { name, .. } => cause_text.hint(if name.starts_with("socketcand") {
             "check the address, the name of the bus and that socketcand runs there; to wait for it, add --wait 1m"
         } else {
             "list the serial adapters: cangauge bus list; to wait for one, add --wait 1m"
         }),
         BusError::NoInterface(_) | BusError::NotCan(_) => {
-            words.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
+            cause_text.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
         }
         BusError::ListenOnly(name) => {
-            words.hint(format!("leave this mode: sudo cangauge bus up {name} 250k (use the sensors' bit rate)"))
+            cause_text.hint(format!("leave this mode: sudo cangauge bus up {name} 250k (use the sensors' bit rate)"))
         }
-        BusError::ReceiveOnly(_) => words.hint(
+        BusError::ReceiveOnly(_) => cause_text.hint(
             "commands that only listen work on it: log, check, monitor, health, pdo watch, scan --passive, nmt watch",
         ),
-        BusError::InUse(_) => words.hint("wait until it ends, or stop it; to ignore it, add --ignore-lock"),
+        BusError::InUse(_) => cause_text.hint("wait until it ends, or stop it; to ignore it, add --ignore-lock"),
         BusError::Recording { file, error, .. } => match recording_hint(file, error) {
-            Some(hint) => words.hint(hint),
-            None => words,
+            Some(hint) => cause_text.hint(hint),
+            None => cause_text,
         },
-        BusError::NoRemoteFrames => words.hint("use SDO instead: --poll 100ms"),
-        BusError::Unsupported(_) => words.hint("use simulated devices: --bus sim"),
-        _ => words,
+        BusError::NoRemoteFrames => cause_text.hint("use SDO instead: --poll 100ms"),
+        BusError::Unsupported(_) => cause_text.hint("use simulated devices: --bus sim"),
+        _ => cause_text,
     }
 }
 
@@ -113,42 +113,42 @@ fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
 
 /// Returns the message and the hint for a failed SDO transfer.
 pub(super) fn sdo(error: &SdoError) -> CauseText {
-    let words = CauseText::new(error.to_string());
+    let cause_text = CauseText::new(error.to_string());
     match error.failure {
         SdoFailure::NoAnswer { waited, started, missed } => match silence_advice(error.node, waited, started, missed) {
-            Some(hint) => words.hint(hint),
-            None => words,
+            Some(hint) => cause_text.hint(hint),
+            None => cause_text,
         },
         SdoFailure::Fit(_) => {
-            words.hint(format!("show its bytes: cangauge sdo read {} {} --type hex", error.node, error.object))
+            cause_text.hint(format!("show its bytes: cangauge sdo read {} {} --type hex", error.node, error.object))
         }
         SdoFailure::Refused(code) if error.operation == Operation::Write && error.object.index == 0x1010 => {
             match code.0 {
-                0x0606_0000 => words.hint("its non-volatile memory may be worn out"),
+                0x0606_0000 => cause_text.hint("its non-volatile memory may be worn out"),
                 0x0800_0021 | 0x0800_0022 => {
-                    words.hint(format!("leave OPERATIONAL first: cangauge nmt preop {}", error.node))
+                    cause_text.hint(format!("leave OPERATIONAL first: cangauge nmt preop {}", error.node))
                 }
-                _ => words,
+                _ => cause_text,
             }
         }
-        SdoFailure::TwoDevices(_) | SdoFailure::NotWritten(_) => words.hint(format!(
+        SdoFailure::TwoDevices(_) | SdoFailure::NotWritten(_) => cause_text.hint(format!(
             "disconnect one of them, or change its node-ID: cangauge lss scan; to see both answers: cangauge scan {} \
              --trace -",
             error.node
         )),
-        SdoFailure::Disturbed => words.hint("stop the other program for a moment, or try again"),
-        SdoFailure::Violation(Violation::WriteAcknowledgeToRead, _) => words.hint(format!(
+        SdoFailure::Disturbed => cause_text.hint("stop the other program for a moment, or try again"),
+        SdoFailure::Violation(Violation::WriteAcknowledgeToRead, _) => cause_text.hint(format!(
             "if it answers every read with 60h, read its device type first: cangauge sdo read {} 0x1000 {}",
             error.node, error.object
         )),
-        SdoFailure::Violation(Violation::Crc, _) => words.hint("read it without blocks: add --block never"),
+        SdoFailure::Violation(Violation::Crc, _) => cause_text.hint("read it without blocks: add --block never"),
         SdoFailure::Refused(_)
         | SdoFailure::Violation(..)
         | SdoFailure::WrongLength { .. }
         | SdoFailure::NotANumber
         | SdoFailure::Ambiguous
         | SdoFailure::TimeLimit(_)
-        | SdoFailure::Cancelled => words,
+        | SdoFailure::Cancelled => cause_text,
     }
 }
 
@@ -210,7 +210,7 @@ pub(super) fn check_silent_node(node: NodeId) -> String {
 
 /// Returns the message and the hint for a failed LSS service.
 pub(super) fn lss(error: &LssError) -> CauseText {
-    let words = CauseText::new(error.to_string());
+    let cause_text = CauseText::new(error.to_string());
     let hint = match error {
         LssError::Refused { service, .. } => refusal_hint(*service),
         LssError::NoAnswer { service, .. } => silence_hint(*service),
@@ -224,8 +224,8 @@ pub(super) fn lss(error: &LssError) -> CauseText {
         LssError::Violation { .. } | LssError::Master(_) => None,
     };
     match hint {
-        Some(hint) => words.hint(hint),
-        None => words,
+        Some(hint) => cause_text.hint(hint),
+        None => cause_text,
     }
 }
 

@@ -21,10 +21,10 @@ pub(super) fn words(failure: &Failure, cause: &CheckFailure) -> CauseText {
             CauseText::new(format!("{} of {all} {} failed: {}", failed.len(), checks(*all), list.join("; ")))
         }
         CheckFailure::UnknownType { signal } => {
-            let words = CauseText::new(doubt::unknown_type(signal));
+            let cause_text = CauseText::new(doubt::unknown_type(signal));
             match failure.node {
-                Some(node) => words.hint(doubt::type_remedy(node, signal)),
-                None => words,
+                Some(node) => cause_text.hint(doubt::type_remedy(node, signal)),
+                None => cause_text,
             }
         }
         CheckFailure::NoData { without, all } => {

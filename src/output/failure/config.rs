@@ -10,11 +10,13 @@ pub(super) fn words(cause: &ConfigFailure) -> CauseText {
         ConfigFailure::Mistake { file, mistake } => of_mistake(file, mistake),
         ConfigFailure::Condition { place, key, wanted, found } => {
             let found = found.as_ref().map_or_else(|| "unknown".to_owned(), ToString::to_string);
-            let words =
+            let cause_text =
                 CauseText::new(format!("another device: {key} is {found}, the file has {wanted} (line {place})"));
             match key.as_str() {
-                "calibration.serial" => words.hint("omit --with-calibration: a calibration is for one device only"),
-                _ => words.hint("compare both: cangauge config diff NODE FILE"),
+                "calibration.serial" => {
+                    cause_text.hint("omit --with-calibration: a calibration is for one device only")
+                }
+                _ => cause_text.hint("compare both: cangauge config diff NODE FILE"),
             }
         }
         ConfigFailure::NoSerial { place } => {

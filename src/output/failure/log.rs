@@ -19,14 +19,14 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> CauseText {
             .hint(format!("the signals are: {}", known.join(", "))),
         LogFailure::NoStatus { signal } => CauseText::new(format!("no node has a status object for {signal}")),
         LogFailure::NotMapped { name, disabled } => {
-            let words = match disabled {
+            let message = match disabled {
                 Some((node, number)) => format!(
                     "{number} of node {node} contains {name}, but is disabled (bit 31 of {:04X}h:1)",
                     number.communication(1).index
                 ),
                 None => format!("no TPDO contains {name}"),
             };
-            CauseText::new(words)
+            CauseText::new(message)
                 .hint("read it by SDO: --poll 100ms (without --sync); or put it into a TPDO: cangauge pdo map --help")
         }
         LogFailure::NotOverheard { name, known } => not_overheard(name, known),
@@ -86,9 +86,9 @@ fn unknown_mapping(failure: &Failure) -> CauseText {
 }
 
 fn other_length(failure: &Failure, mapped: usize, received: usize, is_live: bool) -> CauseText {
-    let words = CauseText::new(diagnosis::wrong_length(mapped, received));
+    let cause_text = CauseText::new(diagnosis::wrong_length(mapped, received));
     let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
-    words.hint(match is_live {
+    cause_text.hint(match is_live {
         true => "read by SDO instead: omit --passive, and add --poll 100ms".to_owned(),
         false => format!("name a description that has its mapping: --device {node}=FILE, or --eds {node}=FILE"),
     })
@@ -101,8 +101,8 @@ fn no_rtr(number: TpdoNumber) -> CauseText {
 }
 
 fn not_overheard(name: &str, known: &[String]) -> CauseText {
-    let words = CauseText::new(format!("none of the known TPDO mappings contains {name}"));
-    if known.is_empty() { words } else { words.hint(format!("they contain: {}", known.join(", "))) }
+    let cause_text = CauseText::new(format!("none of the known TPDO mappings contains {name}"));
+    if known.is_empty() { cause_text } else { cause_text.hint(format!("they contain: {}", known.join(", "))) }
 }
 
 fn nodes_lost(nodes: &[NodeId]) -> String {
@@ -117,13 +117,13 @@ fn count(rows: u64) -> String {
 
 fn no_measurements(within: Duration, nodes: &[(NodeId, Silence)]) -> CauseText {
     let within = format_duration(within);
-    let words = match nodes {
+    let cause_text = match nodes {
         [(_, silence)] => CauseText::new(format!("no measurements within {within}: {}", diagnosis::reason(silence))),
         _ => CauseText::new(format!("no measurements from any node within {within}; {}", diagnosis::reasons(nodes))),
     };
     match nodes.first().and_then(|(node, silence)| diagnosis::hint(silence, *node, "add")) {
-        Some(hint) => words.hint(hint),
-        None => words,
+        Some(hint) => cause_text.hint(hint),
+        None => cause_text,
     }
 }
 
@@ -150,10 +150,10 @@ fn nothing_received(
         [(only, _)] => only.to_string(),
         _ => "all".to_owned(),
     };
-    let words = CauseText::new(format!("no measurements within {within}: {what} received{states}"));
+    let cause_text = CauseText::new(format!("no measurements within {within}: {what} received{states}"));
     // The nodes are already started, so they wait for another trigger.
     if nodes.iter().all(|(_, state)| *state == Some(NmtState::Operational)) {
-        return words.hint("--passive cannot read the reason from the nodes: omit it");
+        return cause_text.hint("--passive cannot read the reason from the nodes: omit it");
     }
-    words.hint(format!("--passive starts no node: omit it, or: cangauge nmt start {node}"))
+    cause_text.hint(format!("--passive starts no node: omit it, or: cangauge nmt start {node}"))
 }

@@ -18,14 +18,14 @@ const CONNECT_ALONE: &str = "connect only this device";
 
 /// The message and the hint for a cause. A device without a known node-ID is shown by its identity.
 pub(super) fn words(failure: &Failure, cause: &LssFailure) -> CauseText {
-    let mut words = cause_words(failure, cause);
+    let mut cause_text = describe_cause(failure, cause);
     if let (None, Some(address)) = (failure.node, cause.device.address) {
-        words.message = format!("{address}: {}", words.message);
+        cause_text.message = format!("{address}: {}", cause_text.message);
     }
-    words
+    cause_text
 }
 
-fn cause_words(failure: &Failure, cause: &LssFailure) -> CauseText {
+fn describe_cause(failure: &Failure, cause: &LssFailure) -> CauseText {
     match &cause.cause {
         LssCause::Service(error) => service(&cause.device, error),
         LssCause::OtherDescription(device) => {
@@ -94,10 +94,10 @@ fn other_node_id(found: Option<NodeId>) -> CauseText {
 
 /// Returns the message if the answers from a node-ID cannot be assigned to one device.
 fn duplicate_node_id(sign: DuplicateSign) -> CauseText {
-    let words = duplicate(sign);
+    let message = duplicate(sign);
     match sign {
-        DuplicateSign::OtherMaster => CauseText::new(words).hint("stop the other program, or try again"),
-        _ => CauseText::new(format!("{words}: several devices probably have this node-ID")).hint(
+        DuplicateSign::OtherMaster => CauseText::new(message).hint("stop the other program, or try again"),
+        _ => CauseText::new(format!("{message}: several devices probably have this node-ID")).hint(
             "connect one device at a time, or use the identity on its label: \
              cangauge lss set-id VENDOR:PRODUCT:REVISION:SERIAL NEW",
         ),
@@ -106,13 +106,13 @@ fn duplicate_node_id(sign: DuplicateSign) -> CauseText {
 
 /// Returns the message if an LSS service failed. If the device is silent, the hint says that it may answer in STOPPED.
 fn service(device: &DeviceName, error: &LssError) -> CauseText {
-    let words = below::lss(error);
+    let cause_text = below::lss(error);
     let is_silent = matches!(error, LssError::NoAnswer { service, .. } if below::is_addressing(*service));
     match (device.node, device.address) {
-        (Some(node), Some(address)) if is_silent => words.hint(format!(
+        (Some(node), Some(address)) if is_silent => cause_text.hint(format!(
             "it may answer LSS only in STOPPED: cangauge nmt stop {node} && cangauge lss inquire {address}"
         )),
-        _ => words,
+        _ => cause_text,
     }
 }
 
@@ -195,11 +195,11 @@ fn after_reset(failure: &Failure, cause: &LssCause) -> CauseText {
             CauseText::new(format!("it was reset but still has node-ID {old}, not {new}"))
         }
         LssCause::NotSeen { new, waited } => {
-            let words =
+            let cause_text =
                 CauseText::new(format!("no boot-up and no answer from node {new} within {}", format_duration(*waited)));
             match failure.node {
-                Some(_) => words.hint("list the devices: cangauge lss scan"),
-                None => words,
+                Some(_) => cause_text.hint("list the devices: cangauge lss scan"),
+                None => cause_text,
             }
         }
         _ => CauseText::default(),
@@ -231,11 +231,11 @@ fn retime(cause: &LssCause) -> CauseText {
         LssCause::SilentAtRate(bits) => CauseText::new(format!("it does not answer at {}", short(*bits))),
         LssCause::SilentAfterStore { bit_rate, interface, host } => {
             let new = short(*bit_rate);
-            let words = CauseText::new(format!(
+            let cause_text = CauseText::new(format!(
                 "stored and reset, but the device does not answer at {new}; the host uses {}",
                 short(*host)
             ));
-            words.hint(format!("find its bit rate: cangauge bus detect {interface} --active"))
+            cause_text.hint(format!("find its bit rate: cangauge bus detect {interface} --active"))
         }
         _ => CauseText::default(),
     }

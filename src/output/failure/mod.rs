@@ -88,7 +88,7 @@ impl CauseText {
 }
 
 impl ErrorMessage {
-    /// The text of a failure of a task.
+    /// Converts the failure of a task to text.
     pub fn of(failure: &Failure) -> ErrorMessage {
         failure.into()
     }
@@ -182,9 +182,9 @@ pub fn kind_name(kind: Kind) -> &'static str {
 
 impl From<&Failure> for ErrorMessage {
     fn from(failure: &Failure) -> ErrorMessage {
-        let words = words(failure);
-        let mut message = words.message;
-        let mut hint = words.hint;
+        let cause_text = words(failure);
+        let mut message = cause_text.message;
+        let mut hint = cause_text.hint;
         let mut effects = Vec::new();
         for item in &failure.effects {
             let text = effect(failure.node, item);
@@ -205,7 +205,7 @@ impl From<&Failure> for ErrorMessage {
             abort: failure.abort().map(|code| format!("0x{:08X}", code.0)),
             message,
             hint,
-            place: words.place,
+            place: cause_text.place,
             effects,
         }
     }

@@ -61,10 +61,10 @@ pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> CauseText {
         PdoFailure::WidthUnknown { object } => CauseText::new(format!("the width of {object} is unknown"))
             .hint(format!("add the width in bits: {object}/32")),
         PdoFailure::Change { error, write, mappable } => {
-            let words = CauseText::new(step(error, write.as_ref()));
+            let cause_text = CauseText::new(step(error, write.as_ref()));
             match mappable.is_empty() {
-                true => words,
-                false => words.hint(format!("it can map: {}", list_some(mappable))),
+                true => cause_text,
+                false => cause_text.hint(format!("it can map: {}", list_some(mappable))),
             }
         }
         PdoFailure::NothingReceived { nodes } => nothing_received(nodes),
@@ -72,11 +72,11 @@ pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> CauseText {
 }
 
 fn unknown_name(name: &str, nearest: &[String], signals: &[String]) -> CauseText {
-    let words = CauseText::new(format!("no object or signal \"{name}\""));
+    let cause_text = CauseText::new(format!("no object or signal \"{name}\""));
     match (nearest, signals) {
-        ([], []) => words,
-        ([], signals) => words.hint(format!("its signals: {}", signals.join(", "))),
-        (nearest, _) => words.hint(format!("similar names: {}", nearest.join(", "))),
+        ([], []) => cause_text,
+        ([], signals) => cause_text.hint(format!("its signals: {}", signals.join(", "))),
+        (nearest, _) => cause_text.hint(format!("similar names: {}", nearest.join(", "))),
     }
 }
 
@@ -84,11 +84,11 @@ fn nothing_received(nodes: &[(NodeId, Silence)]) -> CauseText {
     if nodes.is_empty() {
         return CauseText::new("no TPDO was received");
     }
-    let words = CauseText::new(format!("no TPDO was received; {}", diagnosis::reasons(nodes)));
+    let cause_text = CauseText::new(format!("no TPDO was received; {}", diagnosis::reasons(nodes)));
     let hint = |(node, silence): &(NodeId, Silence)| diagnosis::hint(silence, *node, &format!("cangauge log {node}"));
     match nodes.first().and_then(hint) {
-        Some(hint) => words.hint(hint),
-        None => words,
+        Some(hint) => cause_text.hint(hint),
+        None => cause_text,
     }
 }
 

@@ -11,10 +11,10 @@ use crate::tasks::read::ReadFailure;
 pub(super) fn words(failure: &Failure, cause: &ReadFailure) -> CauseText {
     match cause {
         ReadFailure::NoMeasuredValue => {
-            let words = CauseText::new("no measured value of CiA 404");
+            let cause_text = CauseText::new("no measured value of CiA 404");
             match failure.node {
-                Some(node) => words.hint(format!("read an object: cangauge sdo read {node} 0x1000")),
-                None => words,
+                Some(node) => cause_text.hint(format!("read an object: cangauge sdo read {node} 0x1000")),
+                None => cause_text,
             }
         }
         ReadFailure::NoSignal { name, available } if available.is_empty() => {
@@ -31,17 +31,18 @@ pub(super) fn words(failure: &Failure, cause: &ReadFailure) -> CauseText {
             CauseText::new(format!("{signal} is in {from}, which does not convert to {to}"))
         }
         ReadFailure::NotNumber { signal } => {
-            let words = CauseText::new(format!("{signal} is text or bytes, not a number"));
+            let cause_text = CauseText::new(format!("{signal} is text or bytes, not a number"));
             match failure.node {
-                Some(node) => words.hint(format!("cangauge sdo read {node} {signal}")),
-                None => words,
+                Some(node) => cause_text.hint(format!("cangauge sdo read {node} {signal}")),
+                None => cause_text,
             }
         }
         ReadFailure::TypeUnknown { signal, raw } => {
-            let words = CauseText::new(format!("{} (received {})", unknown_type(signal), spaced_bytes(raw.bytes())));
+            let cause_text =
+                CauseText::new(format!("{} (received {})", unknown_type(signal), spaced_bytes(raw.bytes())));
             match failure.node {
-                Some(node) => words.hint(type_remedy(node, signal)),
-                None => words,
+                Some(node) => cause_text.hint(type_remedy(node, signal)),
+                None => cause_text,
             }
         }
         ReadFailure::Invalid { signal, status } => {

@@ -61,11 +61,11 @@ fn errors(count: u64) -> String {
 }
 
 fn unit_not_accepted(signal: &str, unit: Unit, accepted: &[Unit]) -> CauseText {
-    let words = CauseText::new(format!("{signal} accepts {}, not {unit}", list(accepted)));
+    let cause_text = CauseText::new(format!("{signal} accepts {}, not {unit}", list(accepted)));
     let swapped = Unit(unit.0.swap_bytes());
     match accepted.contains(&swapped) {
-        true => words.hint(format!("0x{:08X} is {swapped} in wire order: use 0x{:08X}", unit.0, swapped.0)),
-        false => words,
+        true => cause_text.hint(format!("0x{:08X} is {swapped} in wire order: use 0x{:08X}", unit.0, swapped.0)),
+        false => cause_text,
     }
 }
 
@@ -105,9 +105,9 @@ fn of_filter(cause: &SettingsFailure) -> CauseText {
             let available: Vec<String> =
                 available.iter().map(|(code, meaning)| format!("{meaning} ({code})")).collect();
             let available = available.join(", ");
-            let words =
+            let cause_text =
                 CauseText::new(format!("{signal} has no filter type \"{}\" (it has: {available})", wanted.word()));
-            if doubt.is_empty() { words } else { words.hint(format!("61A0h: {doubt}")) }
+            if doubt.is_empty() { cause_text } else { cause_text.hint(format!("61A0h: {doubt}")) }
         }
         SettingsFailure::NoDamping { signal } => {
             CauseText::new(format!("no object that sets a damping of {signal} is known for this device"))

@@ -25,15 +25,15 @@ pub(super) fn words(failure: &Failure, cause: &StoreFailure) -> CauseText {
             done(*command)
         )),
         StoreFailure::NoGroup { command, group, .. } => {
-            let words = CauseText::new(format!(
+            let cause_text = CauseText::new(format!(
                 "the device cannot {} group {} (no {object}): nothing was {}",
                 name(*command),
                 group.as_str(),
                 done(*command)
             ));
             match failure.node {
-                Some(node) => words.hint(format!("{} everything: cangauge {0} {node}", name(*command))),
-                None => words,
+                Some(node) => cause_text.hint(format!("{} everything: cangauge {0} {node}", name(*command))),
+                None => cause_text,
             }
         }
         StoreFailure::CapabilityUnreadable { command, code } => {

@@ -6,12 +6,12 @@ use crate::tasks::monitor::LssMessage;
 /// A request or an answer in words.
 pub(super) fn words(message: &LssMessage) -> String {
     match message {
-        LssMessage::Request(request) => request_words(*request),
-        LssMessage::Answer(service, answer) => format!("{service}: {}", answer_words(*service, *answer)),
+        LssMessage::Request(request) => request_text(*request),
+        LssMessage::Answer(service, answer) => format!("{service}: {}", answer_text(*service, *answer)),
     }
 }
 
-fn request_words(request: Request) -> String {
+fn request_text(request: Request) -> String {
     let service = request.service();
     let argument = match request {
         Request::SwitchGlobal(Mode::Waiting) => "waiting".to_owned(),
@@ -45,7 +45,7 @@ fn request_words(request: Request) -> String {
     format!("{service}: {argument}")
 }
 
-fn answer_words(service: Service, answer: Answer) -> String {
+fn answer_text(service: Service, answer: Answer) -> String {
     match (service, answer) {
         (_, Answer::Selected) => "a slave is selected".to_owned(),
         (_, Answer::Acknowledge(code)) if code.is_success() => "done".to_owned(),

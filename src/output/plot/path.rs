@@ -70,25 +70,25 @@ pub(super) fn paths(points: &[Point], x: impl Fn(i64) -> f64) -> Vec<Vec<(f64, f
 pub(super) fn dashes(path: &[(f64, f64)], pattern: &[f64]) -> Vec<Vec<(f64, f64)>> {
     let Some(&first) = path.first().filter(|_| !pattern.is_empty()) else { return vec![path.to_vec()] };
     let (mut drawn, mut part) = (Vec::new(), vec![first]);
-    let (mut index, mut left) = (0, pattern[0]);
+    let (mut index, mut remaining) = (0, pattern[0]);
     for pair in path.windows(2) {
         let (mut from, to) = (pair[0], pair[1]);
         loop {
             let (dx, dy) = (to.0 - from.0, to.1 - from.1);
             let length = dx.hypot(dy);
-            if length < left {
-                left -= length;
+            if length < remaining {
+                remaining -= length;
                 part.push(to);
                 break;
             }
-            from = (from.0 + dx * left / length, from.1 + dy * left / length);
+            from = (from.0 + dx * remaining / length, from.1 + dy * remaining / length);
             part.push(from);
             if index % 2 == 0 {
                 drawn.push(std::mem::take(&mut part));
             }
             part = vec![from];
             index = (index + 1) % pattern.len();
-            left = pattern[index];
+            remaining = pattern[index];
         }
     }
     drawn.extend((index % 2 == 0).then_some(part));

@@ -11,7 +11,7 @@ pub(super) type Color = [u8; 3];
 
 pub(super) type Position = (f64, f64);
 
-/// The side of a text that is at its position.
+/// The part of a text that is at the given position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -67,7 +67,7 @@ const MARK: Color = [190, 0, 0];
 const COLORS: [Color; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [0, 0, 0], [86, 180, 233], [230, 159, 0]];
 
-/// Lines and spaces. Curves can also be distinguished without colours.
+/// The lengths of dashes and spaces, so that curves can be distinguished without colours.
 const PATTERNS: [&[f64]; 4] = [&[], &[7.0, 3.0], &[1.5, 3.5], &[9.0, 3.0, 1.5, 3.0]];
 
 /// A rectangle in which curves are drawn.

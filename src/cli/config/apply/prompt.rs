@@ -87,11 +87,11 @@ impl Series<'_> {
     /// error about the bus (or Ctrl-C).
     fn carry_out(&mut self, master: &mut Master<'_>) -> anyhow::Result<Result<End, Failure>> {
         loop {
-            let left = (0..self.table.rows.len()).filter(|row| !self.table.is_done(*row)).count();
-            if left == 0 {
+            let remaining = (0..self.table.rows.len()).filter(|row| !self.table.is_done(*row)).count();
+            if remaining == 0 {
                 return Ok(Ok(End::Complete));
             }
-            self.note(&format!("plug in the next sensor ({left} left; Ctrl-D ends)"));
+            self.note(&format!("plug in the next sensor ({remaining} left; Ctrl-D ends)"));
             let (found, label) = match self.next(master) {
                 Ok(Some(next)) => next,
                 Ok(None) => return Ok(Ok(End::Input)),
