@@ -182,7 +182,7 @@ fn sync_folder(path: &Path) {
     }
 }
 
-/// Returns the folder of the journal (XDG base directories). `None` if neither XDG_STATE_HOME nor HOME is set.
+/// Returns the folder of the journal (XDG base directories). `None` if `XDG_STATE_HOME` and `HOME` are not set.
 fn folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;

@@ -45,7 +45,7 @@ struct Labelled {
 }
 
 impl Plot {
-    /// Plots a recording from the first to the second time of `span` [default: from the first to the last value].
+    /// Plots a recording from the first to the second time of `span` (default: from the first to the last value).
     /// `None` if there is no value in this time.
     pub fn new(recording: Recording, title: String, axis: TimeAxis, span: [Option<i64>; 2]) -> Option<Plot> {
         let (from, to) = (span[0].unwrap_or(i64::MIN), span[1].unwrap_or(i64::MAX));

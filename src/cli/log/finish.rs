@@ -106,8 +106,8 @@ impl Finished {
         }
     }
 
-    /// Returns success or the failures. The first failure decides the exit code. It is `partial` if only some nodes could
-    /// not be recorded.
+    /// Returns success or the failures. The first failure decides the exit code. It is `partial` if only some nodes
+    /// could not be recorded.
     pub(super) fn result(&self, files: &OpenFiles) -> anyhow::Result<()> {
         let unmet = all_satisfied(&self.verdicts, &[]).err();
         let (failed, without_data) = match unmet {
