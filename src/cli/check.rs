@@ -195,7 +195,7 @@ impl Check {
         Ok(())
     }
 
-    /// Measures the signals, and then the figures of the bus and of the nodes.
+    /// Measures the figures of the bus and of the nodes, and then the signals.
     fn measure(&self, global: &Global, waited: StdDuration) -> anyhow::Result<CheckReport> {
         let (figures, signals): (Vec<Expression>, Vec<Expression>) =
             self.expressions.iter().cloned().partition(|expression| !expression.figures().is_empty());
