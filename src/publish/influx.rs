@@ -5,10 +5,14 @@ use super::sink::{Record, Rejection, SendError, Sink, TlsFault, Trouble, io_trou
 use super::target::{Secret, Target, percent_encoded};
 use super::tls::Trust;
 use crate::bus::Wall;
-use std::io::Read;
+use std::io::{self, Read};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
-use ureq::Agent;
-use ureq::http::StatusCode;
+use ureq::http::{HeaderValue, Response, StatusCode, Version};
+use ureq::unversioned::resolver::DefaultResolver;
+use ureq::unversioned::transport::{ConnectionDetails, Connector, DefaultConnector, Transport};
+use ureq::{Agent, Body};
 
 /// The most bytes of an answer that are read.
 const LONGEST_ANSWER: u64 = 4096;
@@ -19,10 +23,22 @@ const LONGEST_REASON: usize = 300;
 /// The number of lines with different numbers below a microsecond.
 const LINES_PER_US: u64 = 1000;
 
+/// VictoriaMetrics writes rows to its disk some seconds after their acknowledgement.
+const GRACE: Duration = Duration::from_secs(15);
+
+/// The longest time without a request over the same connection. Servers close it earlier or later.
+const LONGEST_IDLE: Duration = Duration::from_secs(300);
+
+/// A server that needs this many new connections in a row closes each one after its answer.
+const MOST_CONNECTIONS: u32 = 3;
+
 /// A database.
 pub struct Influx {
     agent: Agent,
+    connections: Connections,
     url: String,
+    /// Each of the databases answers here, in a few bytes.
+    ping: String,
     /// The value of the header `Authorization`.
     authorization: Option<String>,
     /// The start of the lines of each origin and node.
@@ -39,12 +55,14 @@ impl Influx {
             .max_redirects_will_error(false)
             .timeout_global(Some(timeout))
             .proxy(None)
+            .max_idle_age(LONGEST_IDLE)
             .user_agent(concat!("cangauge/", env!("CARGO_PKG_VERSION")));
         if let Some(trust) = trust {
             config = trust.configure(config);
         }
         let scheme = if trust.is_some() { "https" } else { "http" };
         let (place, path) = (format!("{scheme}://{}:{}", target.host, target.port), target.path.as_slice());
+        let ping = format!("{place}/ping");
         let url = match path {
             [org, bucket] => format!(
                 "{place}/api/v2/write?org={}&bucket={}&precision=ns",
@@ -60,7 +78,10 @@ impl Influx {
             Some(_) => format!("Basic {}", base64(secret.text().as_bytes())),
             None => format!("Token {}", secret.text()),
         });
-        Influx { agent: Agent::new_with_config(config.build()), url, authorization, heads: Vec::new() }
+        let connections = Connections::default();
+        let connector = DefaultConnector::new().chain(Counter(Arc::clone(&connections.opened)));
+        let agent = Agent::with_parts(config.build(), connector, DefaultResolver::default());
+        Influx { agent, connections, url, ping, authorization, heads: Vec::new() }
     }
 
     fn head(&mut self, record: &Record<'_>) -> &[u8] {
@@ -95,12 +116,29 @@ impl Sink for Influx {
         push_line(out, self.head(record), &line);
     }
 
+    fn grace(&self) -> Duration {
+        GRACE
+    }
+
+    fn has_restarted(&self) -> bool {
+        self.connections.has_restarted
+    }
+
+    fn idle(&mut self, probe: bool) -> Result<(), Trouble> {
+        if probe {
+            let mut response = self.connections.answered(self.agent.get(&self.ping).call())?;
+            // The connection can be used again after the whole answer.
+            let _ = io::copy(&mut response.body_mut().as_reader().take(LONGEST_ANSWER), &mut io::sink());
+        }
+        Ok(())
+    }
+
     fn send(&mut self, rows: &[u8], _now: Wall) -> Result<(), SendError> {
         let mut request = self.agent.post(&self.url).content_type("text/plain; charset=utf-8");
         if let Some(authorization) = &self.authorization {
             request = request.header("Authorization", authorization);
         }
-        let mut response = request.send(rows).map_err(|error| trouble(&error))?;
+        let mut response = self.connections.answered(request.send(rows))?;
         let status = response.status();
         if status == StatusCode::NO_CONTENT {
             return Ok(());
@@ -110,6 +148,60 @@ impl Sink for Influx {
         // An answer that is cut off or late still has its status.
         let _ = response.body_mut().as_reader().take(LONGEST_ANSWER).read_to_end(&mut body);
         Err(answer(status.as_u16(), &String::from_utf8_lossy(&body), wait.map(Duration::from_secs)))
+    }
+}
+
+/// Counts connections that are opened.
+#[derive(Debug)]
+struct Counter(Arc<AtomicU64>);
+
+impl<In: Transport> Connector<In> for Counter {
+    type Out = In;
+
+    fn connect(&self, _details: &ConnectionDetails, chained: Option<In>) -> Result<Option<In>, ureq::Error> {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        Ok(chained)
+    }
+}
+
+/// Whether answers come over the same connection. A new connection is a sign that the server was restarted.
+#[derive(Debug, Default)]
+struct Connections {
+    /// The number of connections that were opened.
+    opened: Arc<AtomicU64>,
+    /// This number at the last answer.
+    known: u64,
+    /// The last answers that each came over a new connection.
+    new_in_row: u32,
+    /// Whether the present connection ends without a restart.
+    is_end_expected: bool,
+    has_restarted: bool,
+}
+
+impl Connections {
+    /// Notes which connection the answer came over.
+    fn answered(&mut self, answer: Result<Response<Body>, ureq::Error>) -> Result<Response<Body>, Trouble> {
+        let response = answer.map_err(|error| {
+            let trouble = trouble(&error);
+            // The client itself has closed the connection.
+            self.is_end_expected |= trouble == Trouble::Timeout;
+            self.has_restarted = false;
+            trouble
+        })?;
+        self.used();
+        let connection = response.headers().get("connection").map(HeaderValue::as_bytes).unwrap_or_default();
+        let is_last = connection.eq_ignore_ascii_case(b"close") || response.version() == Version::HTTP_10;
+        self.is_end_expected |= is_last;
+        Ok(response)
+    }
+
+    fn used(&mut self) {
+        let opened = self.opened.load(Ordering::Relaxed);
+        let (is_first, is_new) = (self.known == 0, opened != self.known);
+        self.known = opened;
+        self.new_in_row = if is_new { self.new_in_row.saturating_add(1) } else { 0 };
+        let is_expected = is_new && std::mem::take(&mut self.is_end_expected);
+        self.has_restarted = is_new && !is_first && !is_expected && self.new_in_row <= MOST_CONNECTIONS;
     }
 }
 
@@ -181,6 +273,62 @@ mod tests {
     use super::*;
     use crate::publish::row::Row;
     use crate::publish::sink::Origin;
+    use std::io::Write;
+    use std::net::TcpListener;
+    use std::sync::mpsc;
+    use std::thread;
+
+    #[test]
+    fn new_connection_is_a_sign_of_a_restart() {
+        let mut connections = Connections::default();
+        let mut acknowledged = |opened: u64, is_end_expected: bool| {
+            connections.opened.store(opened, Ordering::Relaxed);
+            connections.is_end_expected |= is_end_expected;
+            connections.used();
+            connections.has_restarted
+        };
+        let kept = [1, 1, 2, 2, 2, 4].map(|opened| acknowledged(opened, false));
+        assert_eq!(kept, [false, false, true, false, false, true]);
+        assert_eq!(
+            [(5, true), (5, false), (6, false)].map(|(opened, end)| acknowledged(opened, end)),
+            [false, false, true]
+        );
+        // Each request has its own connection.
+        let closing = [7, 8, 9, 10].map(|opened| acknowledged(opened, false));
+        assert_eq!(closing, [true, true, false, false]);
+    }
+
+    #[test]
+    fn probe_uses_the_connection_of_the_rows() {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = listener.local_addr().expect("an address");
+        let (closed, is_closed) = mpsc::channel();
+        thread::spawn(move || {
+            // The second connection is that of a restarted server.
+            for requests in [2, 1] {
+                let (mut stream, _) = listener.accept().expect("a connection");
+                for _ in 0..requests {
+                    let mut request = String::new();
+                    let is_whole =
+                        |text: &str| text.ends_with("row\n") || text.starts_with("GET") && text.ends_with("\r\n\r\n");
+                    while !is_whole(&request) {
+                        let mut bytes = [0; 1000];
+                        let count = stream.read(&mut bytes).expect("readable");
+                        request.push_str(&String::from_utf8_lossy(&bytes[..count]));
+                    }
+                    stream.write_all(b"HTTP/1.1 204 No Content\r\n\r\n").expect("writable");
+                }
+                drop(stream);
+                closed.send(()).expect("a reader");
+            }
+        });
+        let target = Target::parse(&format!("influx://{address}/db")).expect("an address");
+        let mut influx = Influx::new(&target, None, Duration::from_secs(10), None);
+        assert_eq!(influx.send(b"row\n", Wall::default()), Ok(()));
+        assert_eq!((influx.idle(true), influx.has_restarted()), (Ok(()), false));
+        is_closed.recv().expect("closed");
+        assert_eq!((influx.send(b"row\n", Wall::default()), influx.has_restarted()), (Ok(()), true));
+    }
 
     #[test]
     fn base64_of_rfc_4648() {

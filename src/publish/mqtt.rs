@@ -160,7 +160,7 @@ impl Sink for Mqtt {
     }
 
     /// Keeps the connection open, so that the broker does not publish the will.
-    fn idle(&mut self) -> Result<(), Trouble> {
+    fn idle(&mut self, _probe: bool) -> Result<(), Trouble> {
         if self.bench.is_none() {
             return Ok(());
         }

@@ -1,16 +1,21 @@
 //! Publishes one recording to one server: reads lines, sends them, and moves the position after the acknowledgement.
 //!
+//! The position file has the last position whose rows the server has certainly stored ([`recent`]).
+//!
 //! [`Publisher::step`] performs one action: read, send, save rejected rows, or save the position. A publisher that ends
 //! between any two steps loses no row.
+
+mod recent;
 
 use super::batch::{Batch, Entry};
 use super::position::{Position, PositionFile, Stored};
 use super::row::{Content, RowReader};
 use super::run::{Run, Runs};
 use super::sink::{Origin, Record, SendError, Sink, Trouble};
-use super::spool::{Chunk, Spool, Start};
+use super::spool::{Chunk, Place, Spool, Start};
 pub use super::state::{Options, Progress, PublishError, PublishEvent};
 use crate::bus::{Mono, Stamp, Wall};
+use recent::Recent;
 use serde::Serialize;
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -75,7 +80,11 @@ pub struct Publisher<S> {
     origin: Origin,
     /// The tags and the run from which `origin` was made.
     origin_of: Option<(u64, Option<Run>)>,
+    /// The position after all acknowledged rows.
     position: Position,
+    /// The position in the file.
+    safe: Position,
+    recent: Recent,
     file: PositionFile,
     rejects: PathBuf,
     stage: Stage,
@@ -115,12 +124,7 @@ impl<S: Sink> Publisher<S> {
         let position = stored.position();
         let mut spool = Spool::open(recording, position.as_ref(), start).map_err(PublishError::Read)?;
         events.extend(spool.take_events().into_iter().map(PublishEvent::Spool));
-        let is_at_start = spool.place().is_none_or(|place| place.offset == 0);
-        let header = match &position {
-            _ if is_at_start => String::new(),
-            Some(position) => position.header.clone(),
-            None => spool.first_line(),
-        };
+        let header = header(&spool, position.as_ref());
         let (is_new, mut position) = (position.is_none(), position.unwrap_or_default());
         url.clone_into(&mut position.url);
         if let Some(place) = spool.place() {
@@ -136,6 +140,8 @@ impl<S: Sink> Publisher<S> {
             runs: Runs::of(recording),
             origin: Origin::default(),
             origin_of: None,
+            safe: position.clone(),
+            recent: Recent::default(),
             position,
             file,
             rejects: super::position::file_name(recording, name, "rejected"),
@@ -197,8 +203,10 @@ impl<S: Sink> Publisher<S> {
         &self.rejects
     }
 
-    /// Ends the connection.
-    pub fn close(&mut self) {
+    /// Saves the position after all acknowledged rows, and ends the connection.
+    pub fn close(&mut self, now: Wall) {
+        // Without the position, the rows are sent again.
+        let _ = self.settle_all(now);
         self.sink.close();
     }
 
@@ -218,7 +226,11 @@ impl<S: Sink> Publisher<S> {
             Stage::Read => self.read(now),
             Stage::Send(batch) => self.send(batch, now),
             Stage::SaveRejected(batch) => self.save_rejected(batch),
-            Stage::SavePosition(batch) => self.save_position(&batch, now),
+            Stage::SavePosition(batch) => {
+                self.save_position(&batch, now);
+                self.settle(now)?;
+                Ok(Step::Again)
+            }
         }
     }
 
@@ -226,21 +238,14 @@ impl<S: Sink> Publisher<S> {
         let chunk = self.spool.next_chunk().map_err(PublishError::Read)?;
         self.events.extend(self.spool.take_events().into_iter().map(PublishEvent::Spool));
         let Some(chunk) = chunk else {
-            if !self.options.follow {
-                return Ok(Step::Done);
-            }
-            match self.sink.idle() {
-                Err(trouble) => self.set_trouble(trouble, None, now)?,
-                Ok(()) if self.retry.trouble.is_some() => {
-                    self.recover();
-                    "ok".clone_into(&mut self.position.state);
-                    self.store(now.wall)?;
-                    Step::Again
-                }
-                Ok(()) => Step::Again,
-            };
-            return Ok(Step::Wait(POLL_INTERVAL));
+            return self.idle(now);
         };
+        if self.safe.file.is_empty() {
+            // The recording has just begun. Its place is saved for a start at the end.
+            let (file, identity) = (chunk.end.file.clone(), chunk.end.identity);
+            self.safe.set_place(&Place { file, identity, ..Place::default() }, "");
+            self.store(now.wall)?;
+        }
         let mut batch = Box::new(self.batch(chunk));
         batch.queue(self.most_rows);
         self.stage = Stage::Send(batch);
@@ -325,11 +330,18 @@ impl<S: Sink> Publisher<S> {
 
     fn send(&mut self, mut batch: Box<Batch>, now: Stamp) -> Result<Step, PublishError> {
         if let Some(part) = batch.next_part() {
-            match self.sink.send(batch.bytes(&part), now.wall) {
+            let answer = self.sink.send(batch.bytes(&part), now.wall);
+            if self.is_restarted(&answer) && self.go_back(batch.accepted > 0)? {
+                return match answer {
+                    Err(SendError::Trouble(trouble, after)) => self.set_trouble(trouble, after, now),
+                    _ => Ok(Step::Again),
+                };
+            }
+            match answer {
                 Ok(()) => {
                     self.has_accepted = true;
-                    batch.accept(&part);
                     self.recover();
+                    batch.accept(&part);
                 }
                 Err(SendError::Rejected(rejection)) => batch.reject(part, rejection),
                 Err(SendError::TooLarge) => {
@@ -405,7 +417,7 @@ impl<S: Sink> Publisher<S> {
         Ok(Step::Again)
     }
 
-    fn save_position(&mut self, batch: &Batch, now: Stamp) -> Result<Step, PublishError> {
+    fn save_position(&mut self, batch: &Batch, now: Stamp) {
         self.position.set_place(&batch.end, &batch.header);
         let rejected = batch.rejected.len() as u64;
         self.position.sent += batch.accepted;
@@ -416,14 +428,24 @@ impl<S: Sink> Publisher<S> {
             self.position.last_row = Some(rfc3339(Wall::at(Duration::from_micros(time))));
         }
         "ok".clone_into(&mut self.position.state);
-        self.store(now.wall)?;
-        Ok(Step::Again)
+        self.recent.push(now.mono, self.position.clone());
     }
 
     fn store(&mut self, now: Wall) -> Result<(), PublishError> {
-        self.position.updated = rfc3339(now);
-        let stored = self.file.store(&self.position);
+        self.safe.updated = rfc3339(now);
+        self.position.state.clone_into(&mut self.safe.state);
+        let stored = self.file.store(&self.safe);
         stored.map_err(|error| PublishError::Position(self.file.path().to_owned(), error))
+    }
+}
+
+/// The header of the next row.
+fn header(spool: &Spool, position: Option<&Position>) -> String {
+    let is_at_start = spool.place().is_none_or(|place| place.offset == 0);
+    match position {
+        _ if is_at_start => String::new(),
+        Some(position) => position.header.clone(),
+        None => spool.first_line(),
     }
 }
 

@@ -133,7 +133,7 @@ fn run(number: usize, mut publisher: Publisher<Box<dyn Sink>>, shared: &Shared, 
             Err(error) => break Err(error),
         }
     };
-    publisher.close();
+    publisher.close(clock.now().wall);
     let (progress, events) = (publisher.progress(), publisher.take_events());
     let report = &mut shared.reports()[number];
     report.progress = progress;
@@ -158,8 +158,16 @@ impl Sink for Box<dyn Sink> {
         (**self).send(rows, now)
     }
 
-    fn idle(&mut self) -> Result<(), Trouble> {
-        (**self).idle()
+    fn grace(&self) -> Duration {
+        (**self).grace()
+    }
+
+    fn has_restarted(&self) -> bool {
+        (**self).has_restarted()
+    }
+
+    fn idle(&mut self, probe: bool) -> Result<(), Trouble> {
+        (**self).idle(probe)
     }
 
     fn close(&mut self) {

@@ -61,11 +61,21 @@ pub trait Sink: Send {
     /// The server did not acknowledge all rows. It may have stored some of them.
     fn send(&mut self, rows: &[u8], now: Wall) -> Result<(), SendError>;
 
-    /// Nothing is to be sent at present.
+    /// How long the server may have acknowledged rows only in its memory. They are sent again if it is restarted.
+    fn grace(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    /// Whether the last answer is a sign that the server was restarted.
+    fn has_restarted(&self) -> bool {
+        false
+    }
+
+    /// Nothing is to be sent at present. With `probe`, the server is asked for an answer, so that a restart is noticed.
     ///
     /// # Errors
     /// The connection was lost.
-    fn idle(&mut self) -> Result<(), Trouble> {
+    fn idle(&mut self, _probe: bool) -> Result<(), Trouble> {
         Ok(())
     }
 

@@ -4,7 +4,8 @@ use super::{Bench, Done};
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 
@@ -274,11 +275,35 @@ fn service_follows_a_rotated_recording_and_waits_for_the_server() {
     bench.run("log 127 --duration 1s -o run.csv --rotate 1s --append").exit(0);
     let rows = rows + bench.text("run-0004.csv").lines().count() - 1;
     server.wait_for_lines(rows);
-    let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
-    assert!(killed.success());
+    terminate(&child);
     let done = bench.end(child).exit(0);
     assert!(done.stderr.contains("rows sent"), "{}", done.stderr);
     assert_eq!(server.lines().len(), rows);
+}
+
+#[test]
+fn rows_of_the_last_seconds_are_sent_again_after_a_restart_of_the_server() {
+    let bench = recorded(5);
+    let count = AtomicUsize::new(0);
+    let server =
+        Server::new(move |_| if count.fetch_add(1, Ordering::Relaxed) == 1 { Vec::new() } else { OK.to_vec() });
+    let mut command = bench.command(&["publish", "run.csv", "--follow", "--to", &server.url()]);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
+    server.wait_for_lines(5);
+    bench.run("log 127 --count 2 -o run.csv --append --tag part=P107").exit(0);
+    while server.requests().len() < 3 {
+        server.news.recv_timeout(super::COMMAND_TIMEOUT).expect("a request");
+    }
+    terminate(&child);
+    bench.end(child).exit(0);
+    let bodies: Vec<String> = server.requests().into_iter().map(|request| request.body).collect();
+    assert_eq!(bodies[0].lines().count(), 5, "{bodies:?}");
+    assert_eq!(bodies[2], format!("{}{}", bodies[0], bodies[1]));
+}
+
+fn terminate(child: &Child) {
+    let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
+    assert!(killed.success());
 }
 
 /// Reads one MQTT packet: its first byte and its body.

@@ -1,3 +1,5 @@
+mod restarts;
+
 use super::*;
 use crate::bus::Mono;
 use crate::publish::position::PositionError;
