@@ -138,6 +138,12 @@ PYTHON_CANOPEN = {
 
 DURAND = {
     **COMMON,
+    "SDO-36": (
+        "An acknowledgement of 128 segments, after one was sent, is answered with the end of the block upload.",
+        [
+            ("A000100014000000", "C"), ("A300000000000000", "81"), ("A280140000000000", "CD"), ("8000100000000008", ""),
+        ],
+    ),
     "NMT-13": (
         "1017h keeps its value over a reset of the communication.",
         [("2B17100031D40000", "60"), ("000#8205", None), ("4017100000000000", "4B17100031D4"), ("2B17100000000000", "60")],

@@ -19,7 +19,7 @@ from durand.datatypes import DatatypeEnum as types
 OBJECTS = [
     (0x6110, types.UNSIGNED16, "ro", 90),
     (0x6130, types.REAL32, "ro", 1.5),
-    (0x6131, types.UNSIGNED32, "rw", 0x004E0000),
+    (0x6131, types.UNSIGNED32, "ro", 0x004E0000),
     (0x6132, types.UNSIGNED8, "rw", 3),
     (0x6150, types.UNSIGNED8, "ro", 0),
 ]

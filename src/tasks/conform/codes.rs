@@ -3,6 +3,7 @@
 pub(super) const COMMAND: &[u32] = &[0x0504_0001, 0x0800_0000];
 pub(super) const TOGGLE: &[u32] = &[0x0503_0000, 0x0800_0000];
 pub(super) const BLOCK_SIZE: &[u32] = &[0x0504_0002, 0x0504_0001, 0x0800_0000];
+pub(super) const SEQUENCE: &[u32] = &[0x0504_0003, 0x0504_0001, 0x0800_0000];
 pub(super) const CRC: &[u32] = &[0x0504_0004, 0x0800_0000];
 pub(super) const READ_ONLY: &[u32] = &[0x0601_0002, 0x0601_0000, 0x0800_0000];
 pub(super) const WRITE_ONLY: &[u32] = &[0x0601_0001, 0x0601_0000, 0x0800_0000];

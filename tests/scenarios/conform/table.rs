@@ -217,6 +217,7 @@ pub(super) const SDO: &[Row] = &[
             (is(request, &[0xd5]) && memory.initiate == 0xc6 && !is_right).then_some([0xa1, 0, 0, 0, 0, 0, 0, 0])
         }),
     ),
+    ("large", "SDO-36", Answers(|_, request| is(request, &[0xa2, 128]).then_some([0xcd, 0, 0, 0, 0, 0, 0, 0]))),
 ];
 
 pub(super) const OD: &[Row] = &[

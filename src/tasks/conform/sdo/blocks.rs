@@ -31,6 +31,8 @@ pub(in super::super) const CASES: &[Case] = &[
         .matters(Medium, "Masters with block transfer cannot write."),
     case("SDO-35", "A block download with a wrong CRC is rejected, and changes nothing", DOWNLOAD, download_wrong_crc)
         .matters(Medium, "Damaged data is written."),
+    case("SDO-36", "An acknowledgement of block segments that were not sent is rejected", UPLOAD, upload_sequence)
+        .matters(Low, "After a disturbed transfer, data is missing."),
 ];
 
 /// Starts a block upload of 1000h. `Err` with the verdict if there is no block transfer.
@@ -109,6 +111,21 @@ fn upload_block_size(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
         session.end_transfer()?;
     }
     Ok(Verdict::of(findings))
+}
+
+/// A sequence number that no segment has.
+const WRONG_SEQUENCE: u8 = 128;
+
+fn upload_sequence(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+    let object = ObjectId::DEVICE_TYPE;
+    if let Err(verdict) = start_upload(session, false, 20)? {
+        return Ok(verdict);
+    }
+    if session.raw(request(0xa3, ObjectId::new(0, 0), [0; 4]))?.is_none() {
+        return Ok(Verdict::not_judged(WhyNot::NoBlocks));
+    }
+    let answer = session.raw([0xa2, WRONG_SEQUENCE, 20, 0, 0, 0, 0, 0])?;
+    Ok(Verdict::of(expect_abort(session, object, codes::SEQUENCE, answer)))
 }
 
 /// The CRC of a block download.
