@@ -24,7 +24,7 @@ use std::sync::Arc;
 /// The device should be alone on the bus. If other nodes or other traffic are seen, only one area can be checked
 /// (--only). The command writes only objects of 1000h to 1FFFh and settings of the device profile. Afterwards all
 /// settings and the NMT state are as before. With --store, settings are also stored and restored for a while, and LSS
-/// sets the present node-ID; afterwards the present settings are stored.
+/// sets the present node-ID; afterwards the present settings are stored. Autozero is executed and undone.
 ///
 /// With --eds FILE, the EDS or DCF file is also checked against CiA 306 and compared with the device: existence, size,
 /// access, limits and mapping of each object, and with --store its defaults.
@@ -51,7 +51,7 @@ pub(crate) struct Conform {
     /// Do not run this case: SDO-07. Can be repeated
     #[arg(long, value_name = "CASE", value_parser = parse_case)]
     skip: Vec<String>,
-    /// Also run the cases that write to non-volatile memory or set the node-ID
+    /// Also run the cases that write to non-volatile memory, set the node-ID or execute autozero
     #[arg(long)]
     store: bool,
     /// Write the verdicts as JUnit XML, for CI servers. An existing file is replaced

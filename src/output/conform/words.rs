@@ -107,6 +107,7 @@ fn expected(expected: &Expected) -> String {
         Expected::Limits(low, high) => limits(low.as_ref(), high.as_ref()),
         Expected::Mapped => "an accepted mapping".to_owned(),
         Expected::GenericErrorBit => "bit 0 set".to_owned(),
+        Expected::Above(value) => format!("more than {}", short(*value)),
         Expected::UnitLike(unit) => format!("a unit that can be converted to {unit}"),
         Expected::Measured { value, tolerance } => format!("{} (+/- {})", short(*value), short(*tolerance)),
     }
@@ -171,6 +172,7 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::NotAlone => "not run, because other nodes are on the bus".to_owned(),
         WhyNot::NoChannel => "the device has no analogue input of CiA 404".to_owned(),
         WhyNot::UnknownCode(object) => format!("the meaning of the number in {object} is unknown"),
+        WhyNot::Rejected(object, code) => format!("{object}: the device rejected the write: {code}"),
         WhyNot::NearZero(object) => format!("{object} is too close to zero"),
         WhyNot::NoValidValue(object) => format!("{object} is not valid, or at the end of its range"),
         WhyNot::Failed(failure) => ErrorMessage::of(failure).message,

@@ -2,16 +2,21 @@
 //!
 //! The public texts of CiA 404 have no clause numbers for these objects, so that the cases name the objects.
 
+pub(super) mod autozero;
+pub(super) mod digits;
+pub(super) mod filter;
 pub(super) mod unit;
 pub(super) mod values;
 
 use super::finding::{Finding, Verdict, WhyNot};
 use super::session::{Session, number};
+use crate::bus::Mono;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::measure::layout::{PROCESS_VALUES, Scaling, Signal};
 use crate::node::Error;
 use crate::node::signals::unit_and_digits;
+use crate::tasks::settings::unit::{Scale, in_unit};
 
 /// The operating mode of a channel; 0 is off.
 const OPERATING_MODE: u16 = 0x6112;
@@ -75,6 +80,8 @@ const CHANGED_CHANNELS: usize = 2;
 struct Readings {
     low: f64,
     high: f64,
+    from: Mono,
+    until: Mono,
 }
 
 impl Readings {
@@ -86,11 +93,68 @@ impl Readings {
         self.high - self.low
     }
 
+    /// The fastest change, per second.
+    fn rate(self) -> f64 {
+        self.spread() / self.until.since(self.from).as_secs_f64().max(0.001)
+    }
+
     /// The same readings after a conversion.
     fn map(self, convert: impl Fn(f64) -> Option<f64>) -> Option<Readings> {
         let (one, other) = (convert(self.low)?, convert(self.high)?);
-        Some(Readings { low: one.min(other), high: one.max(other) })
+        Some(Readings { low: one.min(other), high: one.max(other), ..self })
     }
+
+    /// The difference that later readings of the same value may have, because the value moves.
+    fn allowance(self, later: Readings) -> f64 {
+        let elapsed = later.until.since(self.from).as_secs_f64();
+        let moved = self.rate().max(later.rate()) * elapsed;
+        2.0 * (self.spread() + later.spread()) + moved + 0.01 * self.middle().abs()
+    }
+}
+
+/// A number in the unit of a channel, with its rounding error.
+#[derive(Clone, Copy)]
+struct Number {
+    object: ObjectId,
+    scale: Scale,
+    value: f64,
+    rounding: f64,
+}
+
+/// The settings in the unit of a channel.
+fn numbers(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Vec<Number>, Error> {
+    let digits = session.digits_of(channel)?;
+    let mut found = Vec::new();
+    for (object, scale) in in_unit(&session.node, &channel.signal) {
+        let data_type = session.node.data_type(object);
+        if scale == Scale::Moving {
+            continue;
+        }
+        if let Some(value) = session.quantity(object, data_type, digits)? {
+            found.push(Number { object, scale, value, rounding: rounding(data_type, digits, value) });
+        }
+    }
+    Ok(found)
+}
+
+/// Notes that the settings in the unit of a channel may change.
+fn touch_numbers(session: &mut Session<'_, '_>, channel: &Channel) -> Result<(), Error> {
+    for (object, scale) in in_unit(&session.node, &channel.signal) {
+        if scale != Scale::Moving {
+            session.touch(object)?;
+        }
+    }
+    Ok(())
+}
+
+/// The object with the offset of a channel, if it can be read and written.
+fn offset_object(session: &Session<'_, '_>, channel: &Channel) -> Option<ObjectId> {
+    let description = session.node.model.as_ref().map(|model| &model.description);
+    let mut described = description.into_iter().flat_map(|description| &description.autozero);
+    let described = described.find(|one| one.channel == channel.signal.channel).and_then(|one| one.offset);
+    let standard = [0x6127, 0x6124, 0x7124, 0x8124, 0x9124].map(|index| channel.object(index));
+    let mut candidates = described.into_iter().chain(standard);
+    candidates.find(|object| session.settings.before(*object).is_some() && !session.node.is_read_only(*object))
 }
 
 /// A check of one channel.
@@ -132,11 +196,12 @@ impl Session<'_, '_> {
     /// Reads a number several times. `None` if one of them is not valid, or at the end of its range.
     fn readings(&mut self, object: ObjectId, data_type: DataType, digits: u8) -> Result<Option<Readings>, Error> {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let from = self.master.now();
         for _ in 0..READINGS {
             let Some(value) = self.quantity(object, data_type, digits)? else { return Ok(None) };
             (low, high) = (low.min(value), high.max(value));
         }
-        Ok(Some(Readings { low, high }))
+        Ok(Some(Readings { low, high, from, until: self.master.now() }))
     }
 }
 

@@ -116,6 +116,8 @@ pub enum Expected {
     Limits(Option<Scalar>, Option<Scalar>),
     /// An accepted mapping of the object.
     Mapped,
+    /// A value above this one.
+    Above(f64),
     /// A unit that can be converted to this one.
     UnitLike(Unit),
     /// A value in the unit of its channel.
@@ -213,6 +215,8 @@ pub enum WhyNot {
     NoChannel,
     /// The meaning of the number in this object is unknown.
     UnknownCode(ObjectId),
+    /// The device rejected the value of this object, as it may.
+    Rejected(ObjectId, AbortCode),
     /// The process value is so small that both expected values are the same.
     NearZero(ObjectId),
     /// The process value is not valid, or at the end of its range.

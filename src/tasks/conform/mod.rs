@@ -50,7 +50,13 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
     let sdo = [sdo::CASES, sdo::segments::CASES, sdo::general::CASES, sdo::blocks::CASES];
     let others = [od::CASES, nmt::CASES, error_control::CASES, pdo::CASES, pdo::mapping::CASES, pdo::locks::CASES];
     let lower = [emcy::CASES, store::CASES, lss::CASES];
-    let cia404 = [cia404::values::CASES, cia404::unit::CASES];
+    let cia404 = [
+        cia404::values::CASES,
+        cia404::unit::CASES,
+        cia404::digits::CASES,
+        cia404::filter::CASES,
+        cia404::autozero::CASES,
+    ];
     sdo.into_iter().chain(others).chain(lower).chain(cia404).chain([eds::CASES, timing::CASES]).flatten()
 }
 
@@ -165,6 +171,7 @@ pub fn conform(
         guarded: false,
         wrong_sync: false,
         lss_open: false,
+        needs_reset: false,
         stored: Vec::new(),
         is_answer_open: false,
         open_transfer: None,

@@ -48,6 +48,8 @@ pub(super) struct Session<'s, 'bus> {
     pub(super) wrong_sync: bool,
     /// Whether the node may be in LSS configuration state.
     pub(super) lss_open: bool,
+    /// Whether only a reset of the node restores its settings.
+    pub(super) needs_reset: bool,
     /// The sub-indices of 1010h whose stored settings the present case has changed.
     pub(super) stored: Vec<ObjectId>,
     /// Whether the last raw request may still be answered.

@@ -182,6 +182,10 @@ impl Session<'_, '_> {
             self.is_answer_open = false;
         }
         self.leave_lss()?;
+        if self.needs_reset {
+            self.reset(NmtCommand::ResetNode)?;
+            self.needs_reset = false;
+        }
         self.wake_up()?;
         self.end_transfer()?;
         if std::mem::take(&mut self.guarded) {

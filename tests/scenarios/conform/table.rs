@@ -89,7 +89,8 @@ pub(super) const SDO: &[Row] = &[
         "mh4",
         "SDO-10",
         Sends(|memory, frame| {
-            let is_setting = memory.request.is_some_and(|request| request[0] >> 5 == 1 && request[2] >= 0x60);
+            let is_setting =
+                memory.request.is_some_and(|request| request[0] >> 5 == 1 && request[1..3] == [0x32, 0x61]);
             let is_abort = is_answer(&frame) && frame.data().starts_with(&[0x80]);
             if is_setting && is_abort {
                 with(frame, |data| data[4..].copy_from_slice(&[0, 0, 1, 6]))

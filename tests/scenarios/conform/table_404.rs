@@ -1,7 +1,8 @@
 //! One deviation for each case of the area 404.
 
-use super::deviant::Deviation::Sends;
-use super::table::{Row, is, read, with};
+use super::deviant::Deviation::{Answers, Sends};
+use super::deviant::Memory;
+use super::table::{Row, ack, is, read, with};
 use cangauge::canopen::frame::Frame;
 
 const UNIT: [u8; 3] = [0x31, 0x61, 1];
@@ -18,6 +19,22 @@ fn real(frame: Frame, object: [u8; 3], change: fn(f32) -> f32) -> Vec<Frame> {
         }
         _ => vec![frame],
     }
+}
+
+/// Changes the INTEGER16 in the answers to reads of this object.
+fn integer(frame: Frame, object: [u8; 3], change: fn(i16) -> i16) -> Vec<Frame> {
+    match frame.data() {
+        [0x4b, x, y, z, a, b, ..] if [*x, *y, *z] == object => {
+            let value = change(i16::from_le_bytes([*a, *b]));
+            with(frame, |data| data[4..6].copy_from_slice(&value.to_le_bytes()))
+        }
+        _ => vec![frame],
+    }
+}
+
+/// Counts the acknowledged writes of autozero and offset: two in each case.
+fn count_zeros(memory: &mut Memory, frame: &Frame) {
+    memory.count += u32::from(matches!(frame.data(), [0x60, 0x25 | 0x27, 0x61, 1, ..]));
 }
 
 pub(super) const ROWS: &[Row] = &[
@@ -62,6 +79,71 @@ pub(super) const ROWS: &[Row] = &[
             // The third change is that of this case.
             memory.count += u32::from(frame.data().starts_with(&[0x60, 0x31, 0x61, 1]));
             if memory.count == 6 { real(frame, [0x49, 0x61, 1], |value| value + 1.0) } else { vec![frame] }
+        }),
+    ),
+    // An overload within the span.
+    ("mh4", "404-05", Sends(|memory, frame| read(memory, frame, [0x50, 0x61, 1], |data| data[4] = 2))),
+    (
+        "mh4",
+        "404-06",
+        Sends(|_, frame| integer(frame, [0x49, 0x71, 1], |value| if value == 10_000 { 9_000 } else { value })),
+    ),
+    // The integer keeps its three digits.
+    (
+        "mh4",
+        "404-20",
+        Sends(|memory, frame| {
+            if memory.written(DIGITS) != 2 {
+                return vec![frame];
+            }
+            integer(frame, [0x30, 0x71, 1], |value| value * 10)
+        }),
+    ),
+    (
+        "mh4",
+        "404-21",
+        Sends(|memory, frame| {
+            // The second change is that of this case.
+            memory.count += u32::from(frame.data().starts_with(&[0x60, 0x32, 0x61, 1]));
+            if memory.count == 4 { integer(frame, [0x49, 0x71, 1], |value| value - 100) } else { vec![frame] }
+        }),
+    ),
+    ("mh4", "404-30", Answers(|_, request| is(request, &[0x2f, 0xa0, 0x61, 1, 99]).then(|| ack(request)))),
+    (
+        "mh4",
+        "404-31",
+        Sends(|memory, frame| {
+            let is_filtered = memory.written([0xa0, 0x61, 1]) == 1;
+            if is_filtered { real(frame, [0x30, 0x61, 1], |value| value * 1.5) } else { vec![frame] }
+        }),
+    ),
+    (
+        "mh4",
+        "404-50",
+        Answers(|_, request| is(request, &[0x23, 0x25, 0x61, 1, b'z', b'e', b'r', b'a']).then(|| ack(request))),
+    ),
+    (
+        "mh4",
+        "404-51",
+        Sends(|memory, frame| {
+            count_zeros(memory, &frame);
+            if memory.count == 1 { real(frame, [0x30, 0x61, 1], |value| value + 0.5) } else { vec![frame] }
+        }),
+    ),
+    (
+        "mh4",
+        "404-52",
+        Sends(|memory, frame| {
+            count_zeros(memory, &frame);
+            if memory.count == 3 { real(frame, [0x27, 0x61, 1], |_| 0.0) } else { vec![frame] }
+        }),
+    ),
+    (
+        "mh4",
+        "404-53",
+        Sends(|memory, frame| {
+            count_zeros(memory, &frame);
+            if memory.count == 6 { real(frame, [0x30, 0x61, 1], |value| value + 0.5) } else { vec![frame] }
         }),
     ),
 ];

@@ -3,7 +3,7 @@
 use super::super::case::{Area, Case, Run, Severity::*};
 use super::super::finding::{Expected, Finding, Seen, Verdict, WhyNot};
 use super::super::session::Session;
-use super::{CHANGED_CHANNELS, Channel, check_channels, rounding};
+use super::{CHANGED_CHANNELS, Channel, Number, check_channels, numbers, rounding, touch_numbers};
 use crate::canopen::object::ObjectId;
 use crate::device::unit::Unit;
 use crate::node::Error;
@@ -44,31 +44,6 @@ struct Change {
     to: Unit,
 }
 
-/// A number in the unit of a channel, with its rounding error.
-#[derive(Clone, Copy)]
-struct Number {
-    object: ObjectId,
-    scale: Scale,
-    value: f64,
-    rounding: f64,
-}
-
-/// The settings in the unit of a channel.
-fn numbers(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Vec<Number>, Error> {
-    let digits = session.digits_of(channel)?;
-    let mut found = Vec::new();
-    for (object, scale) in in_unit(&session.node, &channel.signal) {
-        let data_type = session.node.data_type(object);
-        if scale == Scale::Moving {
-            continue;
-        }
-        if let Some(value) = session.quantity(object, data_type, digits)? {
-            found.push(Number { object, scale, value, rounding: rounding(data_type, digits, value) });
-        }
-    }
-    Ok(found)
-}
-
 /// The units that a device may accept.
 struct Candidates {
     object: ObjectId,
@@ -88,18 +63,11 @@ fn prepare(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Result<Ca
     if units.is_empty() || session.node.is_read_only(object) {
         return Ok(Err(Verdict::NotApplicable(WhyNot::NotWritable(object))));
     }
-    let followers: Vec<ObjectId> = in_unit(&session.node, &channel.signal)
-        .into_iter()
-        .filter(|(_, scale)| *scale != Scale::Moving)
-        .map(|(object, _)| object)
-        .collect();
     // These could not be restored.
-    if followers.iter().any(|object| session.settings.is_protected(*object)) {
+    if in_unit(&session.node, &channel.signal).iter().any(|(object, _)| session.settings.is_protected(*object)) {
         return Ok(Err(Verdict::NotApplicable(WhyNot::NeedsStore)));
     }
-    for object in followers {
-        session.touch(object)?;
-    }
+    touch_numbers(session, channel)?;
     Ok(Ok(Candidates { object, from, units }))
 }
 
@@ -138,13 +106,10 @@ fn process_value_of(session: &mut Session<'_, '_>, channel: &Channel) -> Result<
         let new = session.readings(object, data_type, digits)?;
         let converted = old.and_then(|old| old.map(|value| change.from.convert(value, change.to)));
         let (Some(old), Some(new), Some(converted)) = (old, new, converted) else { continue };
-        // The value may change meanwhile, and devices use rounded factors.
         let expected = converted.middle();
-        let tolerance = 2.0 * (converted.spread() + new.spread())
-            + 0.01 * expected.abs()
-            + 2.0
-                * rounding(data_type, digits, expected)
-                    .max(converted_rounding(change, rounding(data_type, digits, old.middle())));
+        let steps = rounding(data_type, digits, expected)
+            .max(converted_rounding(change, rounding(data_type, digits, old.middle())));
+        let tolerance = converted.allowance(new) + 2.0 * steps;
         let seen = new.middle();
         if (seen - expected).abs() > tolerance {
             findings.push(Finding::at(object, Expected::Measured { value: expected, tolerance }, Seen::Measured(seen)));

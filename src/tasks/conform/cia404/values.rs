@@ -3,7 +3,7 @@
 use super::super::case::{Area, Case, Run, Severity::*};
 use super::super::finding::{Expected, Finding, Seen, Verdict, WhyNot};
 use super::super::session::Session;
-use super::{Channel, READINGS, check_channels, rounding};
+use super::{Channel, Number, READINGS, check_channels, numbers, rounding};
 use crate::device::sensor::{self, Measurand};
 use crate::device::unit::Unit;
 use crate::node::Error;
@@ -26,19 +26,33 @@ pub(in super::super) const CASES: &[Case] = &[
         equal_values,
     )
     .matters(High, "Masters that use another type receive wrong measurements."),
+    case(
+        "404-05",
+        "The status (6150h) shows an overload if the process value is outside of the span (x148h, x149h)",
+        "CiA 404, object 6150h",
+        status,
+    )
+    .matters(High, "Wrong measurements are used, or right ones are not."),
+    case(
+        "404-06",
+        "The span starts below its end (x148h, x149h), and is the same in all types",
+        "CiA 404, objects x148h and x149h",
+        span,
+    )
+    .matters(Medium, "Tools show a wrong measuring range."),
 ];
 
 /// All channels: these cases only read.
 const ALL: usize = 255;
 
-const NO_UNIT: Verdict = Verdict::NotApplicable(WhyNot::NoSuitableObject);
+const NO_OBJECT: Verdict = Verdict::NotApplicable(WhyNot::NoSuitableObject);
 
 fn unit(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     check_channels(session, ALL, |session, channel| {
         let sensor_type = channel.object(0x6110);
-        let Some(object) = channel.unit else { return Ok(NO_UNIT) };
+        let Some(object) = channel.unit else { return Ok(NO_OBJECT) };
         let (Some(code), Some(unit)) = (session.number(sensor_type)?, session.number(object)?) else {
-            return Ok(NO_UNIT);
+            return Ok(NO_OBJECT);
         };
         let Some(measurand) = u16::try_from(code).ok().and_then(sensor::measurand) else {
             return Ok(Verdict::not_judged(WhyNot::UnknownCode(sensor_type)));
@@ -58,8 +72,8 @@ fn unit(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 
 fn unit_code(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     check_channels(session, ALL, |session, channel| {
-        let Some(object) = channel.unit else { return Ok(NO_UNIT) };
-        let Some(code) = session.number(object)? else { return Ok(NO_UNIT) };
+        let Some(object) = channel.unit else { return Ok(NO_OBJECT) };
+        let Some(code) = session.number(object)? else { return Ok(NO_OBJECT) };
         let bytes = |code: u64| u32::try_from(code).unwrap_or(u32::MAX).to_le_bytes().to_vec();
         let finding = || Finding::at(object, Expected::Bytes(bytes(code & !0xff)), Seen::Bytes(bytes(code)));
         Ok(Verdict::of((code & 0xff != 0).then(finding)))
@@ -71,7 +85,7 @@ const MOST_DIGITS: u64 = 9;
 
 fn digits(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     check_channels(session, ALL, |session, channel| {
-        let Some(object) = channel.digits else { return Ok(NO_UNIT) };
+        let Some(object) = channel.digits else { return Ok(NO_OBJECT) };
         let Some(digits) = session.number(object)? else {
             return Ok(Verdict::NotApplicable(WhyNot::NoObject(object)));
         };
@@ -85,7 +99,7 @@ fn equal_values(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 }
 
 fn equal_values_of(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Verdict, Error> {
-    let [reference, others @ ..] = &channel.values[..] else { return Ok(NO_UNIT) };
+    let [reference, others @ ..] = &channel.values[..] else { return Ok(NO_OBJECT) };
     let digits = session.digits_of(channel)?;
     let (mut findings, mut is_judged) = (Vec::new(), false);
     for &(object, data_type) in others {
@@ -112,8 +126,80 @@ fn equal_values_of(session: &mut Session<'_, '_>, channel: &Channel) -> Result<V
         }
     }
     Ok(match (is_judged, others.is_empty()) {
-        (_, true) => NO_UNIT,
+        (_, true) => NO_OBJECT,
         (false, _) => Verdict::not_judged(WhyNot::NoValidValue(reference.0)),
         _ => Verdict::of(findings),
+    })
+}
+
+/// The families of process values: REAL32, INTEGER16, INTEGER24, INTEGER32.
+const FAMILIES: [u16; 4] = [0x6000, 0x9000, 0x8000, 0x7000];
+
+/// Start and end of the span in each family.
+fn spans(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Vec<[Number; 2]>, Error> {
+    let all = numbers(session, channel)?;
+    let find = |index: u16| all.iter().find(|number| number.object.index == index).copied();
+    let span = |family: u16| Some([find(family | 0x148)?, find(family | 0x149)?]);
+    Ok(FAMILIES.into_iter().filter_map(span).collect())
+}
+
+/// How far the process value is outside of the span if the status must show it: a part of the span.
+const BEYOND: f64 = 0.05;
+
+/// The bits of an overload.
+const POSITIVE: u64 = 0b010;
+const NEGATIVE: u64 = 0b100;
+
+fn status(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+    check_channels(session, ALL, |session, channel| {
+        let object = channel.object(0x6150);
+        if channel.signal.status != Some(object) || !session.node.may_have(object) {
+            return Ok(Verdict::NotApplicable(WhyNot::NoObject(object)));
+        }
+        let Some([start, end]) = spans(session, channel)?.first().copied() else { return Ok(NO_OBJECT) };
+        let digits = session.digits_of(channel)?;
+        let (value, data_type) = channel.values[0];
+        let beyond = BEYOND * (end.value - start.value).abs();
+        let mut wrong = None;
+        for _ in 0..3 {
+            let Some(status) = session.number(object)? else {
+                return Ok(Verdict::NotApplicable(WhyNot::NoObject(object)));
+            };
+            let Some(value) = session.quantity(value, data_type, digits)? else {
+                return Ok(Verdict::not_judged(WhyNot::NoValidValue(value)));
+            };
+            let expected = match value {
+                _ if value > start.value && value < end.value => 0,
+                _ if value > end.value + beyond => POSITIVE,
+                _ if value < start.value - beyond => NEGATIVE,
+                // At the limit both are right.
+                _ => return Ok(Verdict::Pass),
+            };
+            if status & (POSITIVE | NEGATIVE) == expected {
+                return Ok(Verdict::Pass);
+            }
+            wrong = Some(Finding::at(object, Expected::Number(expected), Seen::Number(status)));
+        }
+        Ok(Verdict::of(wrong))
+    })
+}
+
+fn span(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+    check_channels(session, ALL, |session, channel| {
+        let spans = spans(session, channel)?;
+        let [[start, end], others @ ..] = &spans[..] else { return Ok(NO_OBJECT) };
+        let mut findings = Vec::new();
+        if start.value >= end.value {
+            let expected = Expected::Above(start.value);
+            findings.push(Finding::at(end.object, expected, Seen::Measured(end.value)));
+        }
+        for (first, other) in others.iter().flat_map(|[low, high]| [(start, low), (end, high)]) {
+            let tolerance = first.rounding + other.rounding;
+            if (first.value - other.value).abs() > tolerance {
+                let expected = Expected::Measured { value: first.value, tolerance };
+                findings.push(Finding::at(other.object, expected, Seen::Measured(other.value)));
+            }
+        }
+        Ok(Verdict::of(findings))
     })
 }
