@@ -4,6 +4,7 @@
 //! would take most of this time. So only the requested command is built.
 
 use super::{ARGUMENTS, Cli, Global, program};
+use clap::error::ErrorKind;
 use clap::{Args, Command, FromArgMatches};
 use std::ffi::OsString;
 
@@ -12,18 +13,29 @@ use std::ffi::OsString;
 /// # Errors
 /// Wrong arguments. Requests for help or version are also errors.
 pub fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
-    if let Some(mut program) = single_command(&words) {
+    if let Some(mut program) = version_only(&words).or_else(|| single_command(&words)) {
         let matches = program.try_get_matches_from_mut(&words);
         // The process ends soon, so freeing the memory would only take time.
         std::mem::forget(program);
-        if let Ok(mut matches) = matches {
-            let cli = Cli::from_arg_matches_mut(&mut matches);
-            std::mem::forget(matches);
-            return cli;
+        match matches {
+            Ok(mut matches) => {
+                let cli = Cli::from_arg_matches_mut(&mut matches);
+                std::mem::forget(matches);
+                return cli;
+            }
+            Err(version) if version.kind() == ErrorKind::DisplayVersion => return Err(version),
+            Err(_) => {}
         }
     }
     // Errors come from the complete program, because it knows similar commands and their usage.
     program().try_get_matches_from(words).and_then(|mut matches| Cli::from_arg_matches_mut(&mut matches))
+}
+
+/// The program without commands, if only its version is requested.
+fn version_only(words: &[OsString]) -> Option<Command> {
+    let is_version = |word: &OsString| ["-V", "--version"].iter().any(|name| word == name);
+    let program = || Command::new("cangauge").version(env!("CARGO_PKG_VERSION"));
+    matches!(words, [_, word] if is_version(word)).then(program)
 }
 
 /// The program with only one command: the first word that is the name of a command. If this word is the value of an
@@ -91,6 +103,8 @@ mod tests {
             "cangauge help nmt start",
             "cangauge sdo read 200 0x1000",
             "cangauge -V",
+            "cangauge --version",
+            "cangauge --version scna",
         ] {
             let whole = program().try_get_matches_from(words(line)).unwrap_err();
             let error = parse(words(line)).unwrap_err();
