@@ -159,6 +159,10 @@ impl<B: Bus> Bus for Paced<B> {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        // Without a bit rate, there is nothing to measure.
+        if self.bit_rate.get() == Some(None) {
+            return self.bus.send(frame);
+        }
         let Some(answer) = self.answer_of(frame) else { return self.bus.send(frame) };
         let now = self.bus.mono();
         if let Some(load) = &self.load

@@ -113,6 +113,9 @@ impl ActiveTransfer {
         }
         self.unsent = frames.len();
         self.deadline = None;
+        if self.asked_at.is_none() {
+            outgoing.set_timed();
+        }
         for frame in frames {
             outgoing.push(frame, Some(self.ticket));
         }

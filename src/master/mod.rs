@@ -413,7 +413,7 @@ impl<'bus> Master<'bus> {
         if !self.sdo.can_start() && self.outgoing.is_empty() {
             return Ok(None);
         }
-        let now = self.now();
+        let now = if self.sdo.can_start() || self.outgoing.needs_time() { self.now() } else { self.seen };
         self.seen = now;
         self.sdo.advance(&self.timing, now, &mut self.outgoing);
         let (sdo, timing) = (&mut self.sdo, &self.timing);

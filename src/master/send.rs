@@ -31,6 +31,8 @@ pub(super) struct Outgoing {
     first: Option<Frame>,
     /// When the bus accepted this frame.
     first_at: Option<Mono>,
+    /// Whether the moment before sending matters for a queued frame.
+    is_timed: bool,
     /// The record of all frames in both directions, while one is made.
     pub(super) transcript: Option<Transcript>,
 }
@@ -46,6 +48,7 @@ impl Outgoing {
             tolerates_outages: false,
             first: None,
             first_at: None,
+            is_timed: false,
             transcript: None,
         }
     }
@@ -55,13 +58,27 @@ impl Outgoing {
     }
 
     pub(super) fn push(&mut self, frame: Frame, ticket: Option<Ticket>) {
+        self.is_timed |= ticket.is_none();
         self.queue.push_back((frame, ticket));
+    }
+
+    /// The moment before the next frame is sent matters: earlier frames cannot answer it.
+    pub(super) fn set_timed(&mut self) {
+        self.is_timed = true;
+    }
+
+    /// Whether [`Outgoing::flush`] needs the present moment. It does not for the next request of a transfer in
+    /// progress: only its time-out counts, from the moment after sending.
+    pub(super) fn needs_time(&self) -> bool {
+        let is_slowed_down = self.bit_rate.flatten().is_some() || self.queue.len() > MAX_QUEUED_FRAMES as usize;
+        self.is_timed || is_slowed_down || self.full_since.is_some()
     }
 
     /// Queues a frame before all others; `false` if such a frame already waits.
     pub(super) fn push_first(&mut self, frame: Frame) -> bool {
         let is_new = self.queue.front() != Some(&(frame, None));
         if is_new {
+            self.is_timed = true;
             self.queue.push_front((frame, None));
             (self.first, self.first_at) = (Some(frame), None);
         }
@@ -109,7 +126,7 @@ impl Outgoing {
     }
 
     /// Sends all frames that can be sent now, and calls `sent` for each frame of a transfer, with a moment before and
-    /// one after sending. Returns when to try again if frames are left.
+    /// one after sending. `now` may be earlier than the present moment unless [`Outgoing::needs_time`]. Returns when to try again if frames are left.
     ///
     /// # Errors
     /// An error of the bus, or a transmit queue that stays full for `queue_timeout` (at least one second). With
@@ -170,6 +187,7 @@ impl Outgoing {
             self.queue.pop_front();
             self.full_since = None;
         }
+        self.is_timed = false;
         Ok(None)
     }
 }

@@ -29,7 +29,7 @@ pub const SMALL: u8 = 28;
 pub const LARGE: u32 = 889;
 
 /// The interval between two progress reports of a transfer.
-const REPORT_INTERVAL: Duration = Duration::from_millis(100);
+const REPORT_INTERVAL: Duration = Duration::from_millis(250);
 
 /// When block transfer is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -368,7 +368,7 @@ fn ctrl_c_within_a_sub_block_aborts_the_transfer() {
         let data = content(5_000);
         let mut bus = bus(125_000, [device(5, true)]);
         write(&mut bus, DOMAIN, &data, BlockMode::Never).unwrap();
-        bus.interrupt_at(bus.now().mono + Duration::from_millis(200));
+        bus.interrupt_at(bus.now().mono + Duration::from_millis(300));
         let mut master = Master::new(&mut bus, Timing::default());
         let request = if reads {
             Request::read(node(5), DOMAIN).up_to(5_000)

@@ -39,6 +39,9 @@ const LINK_CHECK: Duration = Duration::from_millis(200);
 /// system call instead of four.
 const ANSWER_TIME: Duration = Duration::from_millis(10);
 
+/// The number of such waits after a send, if each of them receives a frame: the segments of a block.
+const ANSWERS: u8 = 127;
+
 /// A CAN interface of the Linux kernel.
 pub struct SocketCan {
     name: String,
@@ -52,8 +55,8 @@ pub struct SocketCan {
     last_frame_at: Mono,
     /// Whether the socket was found empty. The next read then waits first.
     is_drained: bool,
-    /// Whether a frame was sent since the last wait: an answer may come soon.
-    has_sent: bool,
+    /// The number of further answers that may come soon after the last send.
+    expected_answers: u8,
     /// The last reading of the clock.
     last_clock_reading: Cell<Mono>,
     /// Events to deliver before the rest of the batch.
@@ -117,7 +120,7 @@ impl SocketCan {
             own_clock: OwnClock::default(),
             last_frame_at: Mono::START,
             is_drained: false,
-            has_sent: false,
+            expected_answers: 0,
             last_clock_reading: Cell::new(Mono::START),
             ready: VecDeque::new(),
             is_up: true,
@@ -169,6 +172,11 @@ impl SocketCan {
         result
     }
 
+    /// The latest known moment.
+    fn latest(&self) -> Mono {
+        self.last_clock_reading.get().max(self.last_frame_at)
+    }
+
     /// Reads the frames that the kernel holds for this socket.
     /// With `wait`, it waits up to [`ANSWER_TIME`] for the first one.
     fn fill(&mut self, wait: bool) -> Result<(), BusError> {
@@ -177,7 +185,7 @@ impl SocketCan {
                 self.is_drained = count < receive::BATCH;
                 if wait {
                     // An upper estimate of the receive time. A later frame causes a new comparison of the clocks.
-                    self.clocks.batch(self.last_clock_reading.get() + ANSWER_TIME + ANSWER_TIME, false);
+                    self.clocks.batch(self.latest() + ANSWER_TIME + ANSWER_TIME, false);
                 } else {
                     self.clocks.batch(self.mono(), self.is_drained);
                 }
@@ -185,7 +193,7 @@ impl SocketCan {
             }
             Err(error) => match error.raw_os_error() {
                 Some(libc::EAGAIN) => {
-                    self.is_drained = true;
+                    (self.is_drained, self.expected_answers) = (true, 0);
                     Ok(())
                 }
                 Some(libc::EINTR) => Ok(()),
@@ -389,7 +397,7 @@ impl Bus for SocketCan {
         if self.controller().1 {
             return Err(BusError::ListenOnly(self.name.clone()));
         }
-        self.has_sent = true;
+        self.expected_answers = ANSWERS;
         self.socket.write_frame(&to_kernel(frame)).map_err(|error| {
             // The kernel reports this once, to the first call.
             match error.raw_os_error() {
@@ -420,10 +428,8 @@ impl Bus for SocketCan {
                 return Ok(Event::Timeout);
             } else if !self.is_drained {
                 self.fill(false)?;
-            } else if std::mem::take(&mut self.has_sent)
-                && self.is_up
-                && deadline.since(self.last_clock_reading.get()) > ANSWER_TIME * 3
-            {
+            } else if self.expected_answers > 0 && self.is_up && deadline.since(self.latest()) > ANSWER_TIME * 3 {
+                self.expected_answers -= 1;
                 self.fill(true)?;
             } else if self.wait(deadline)? {
                 return Ok(Event::Timeout);
