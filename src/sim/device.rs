@@ -362,8 +362,9 @@ impl Device {
             if tpdo.is_configured_by(object.index) {
                 tpdo.start(&self.memory.objects, &mut self.memory.channels, now);
             } else if measuring {
-                // A new limit, unit or offset changes the values that cause an event.
-                tpdo.watch(&self.memory.objects, &mut self.memory.channels, now);
+                // A new limit is compared with later values. A new unit or offset changes the value itself.
+                let keeps = !matches!(object.index & 0x0fff, 0x133..=0x136);
+                tpdo.watch(&self.memory.objects, &mut self.memory.channels, now, keeps);
             }
         }
     }

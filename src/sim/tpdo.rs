@@ -48,6 +48,8 @@ struct Watch {
     reference: f64,
     below: bool,
     above: bool,
+    /// Whether the value can reach a limit or change by the delta.
+    is_possible: bool,
 }
 
 /// The cause of a transmission.
@@ -129,18 +131,26 @@ impl Tpdo {
     pub(super) fn start(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         *self = Tpdo::new(self.number, self.style);
         self.timer = self.event_timer(objects).map(|period| now + period);
-        self.watch(objects, channels, now);
+        self.watch(objects, channels, now, false);
     }
 
-    /// Determines the values that can cause an event.
-    pub(super) fn watch(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
-        self.watches.clear();
+    /// Determines the values that can cause an event. If `keeps`, they are compared with the values before: the last
+    /// transmitted values, and the limits that were crossed.
+    pub(super) fn watch(&mut self, objects: &Objects, channels: &mut Channels, now: Mono, keeps: bool) {
+        let before = std::mem::take(&mut self.watches);
         if self.is_event_driven(objects) && self.cob_id(objects).is_some() {
             for object in self.mapping(objects) {
-                self.watches.extend(Watch::new(objects, channels, object, now.since_start()));
+                let Some(mut watch) = Watch::new(objects, channels, object, now.since_start()) else { continue };
+                if let Some(last) = before.iter().find(|last| keeps && last.object == object) {
+                    (watch.reference, watch.below, watch.above) = (last.reference, last.below, last.above);
+                }
+                self.watches.push(watch);
             }
         }
         self.schedule_comparison(objects, channels, now);
+        if keeps && !self.watches.is_empty() {
+            self.compare_at = Some(now);
+        }
     }
 
     /// Called when the node leaves OPERATIONAL.
@@ -150,7 +160,7 @@ impl Tpdo {
 
     fn schedule_comparison(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         let next = |watch: &Watch| channels.next_sample(objects, watch.object, now.since_start());
-        self.compare_at = self.watches.iter().filter_map(next).min().map(Mono::at);
+        self.compare_at = self.watches.iter().filter(|watch| watch.is_possible).filter_map(next).min().map(Mono::at);
     }
 
     /// Handles a SYNC. Returns the cause if the TPDO must be sent.
@@ -229,7 +239,7 @@ impl Watch {
         let limits = lower.zip(upper).filter(|limits| *limits != (0.0, 0.0));
         let (lowest, highest) = channels.reach(objects, object)?;
         let reachable = limits.is_some_and(|(lower, upper)| lowest < lower || upper < highest);
-        (delta > 0.0 || reachable).then(|| Watch {
+        (delta > 0.0 || limits.is_some()).then(|| Watch {
             object,
             delta,
             limits,
@@ -237,6 +247,7 @@ impl Watch {
             reference: value,
             below: limits.is_some_and(|(lower, _)| value < lower),
             above: limits.is_some_and(|(_, upper)| value > upper),
+            is_possible: delta > 0.0 || reachable,
         })
     }
 
