@@ -173,6 +173,7 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::NoChannel => "the device has no analogue input of CiA 404".to_owned(),
         WhyNot::UnknownCode(object) => format!("the meaning of the number in {object} is unknown"),
         WhyNot::Rejected(object, code) => format!("{object}: the device rejected the write: {code}"),
+        WhyNot::NotMoved(object) => format!("{object} did not change enough"),
         WhyNot::NearZero(object) => format!("{object} is too close to zero"),
         WhyNot::NoValidValue(object) => format!("{object} is not valid, or at the end of its range"),
         WhyNot::Failed(failure) => ErrorMessage::of(failure).message,

@@ -219,7 +219,7 @@ impl Case {
         Case { needs: Needs::SoleNode, ..self }
     }
 
-    /// The case writes to non-volatile memory, or sets a node-ID or a bit rate.
+    /// The case writes to non-volatile memory, sets a node-ID or a bit rate, or executes autozero.
     pub(super) const fn stores(self) -> Case {
         let needs = match self.needs {
             Needs::Nothing | Needs::Store => Needs::Store,

@@ -4,6 +4,7 @@
 
 pub(super) mod autozero;
 pub(super) mod digits;
+pub(super) mod events;
 pub(super) mod filter;
 pub(super) mod unit;
 pub(super) mod values;

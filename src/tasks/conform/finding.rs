@@ -217,6 +217,8 @@ pub enum WhyNot {
     UnknownCode(ObjectId),
     /// The device rejected the value of this object, as it may.
     Rejected(ObjectId, AbortCode),
+    /// The process value has not moved far enough.
+    NotMoved(ObjectId),
     /// The process value is so small that both expected values are the same.
     NearZero(ObjectId),
     /// The process value is not valid, or at the end of its range.

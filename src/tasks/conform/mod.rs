@@ -56,6 +56,7 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
         cia404::digits::CASES,
         cia404::filter::CASES,
         cia404::autozero::CASES,
+        cia404::events::CASES,
     ];
     sdo.into_iter().chain(others).chain(lower).chain(cia404).chain([eds::CASES, timing::CASES]).flatten()
 }

@@ -73,7 +73,7 @@ pub(super) const CASES: &[Case] = &[
 /// A TPDO of the device.
 #[derive(Clone, Copy)]
 pub(super) struct Tpdo {
-    number: u16,
+    pub(super) number: u16,
     pub(super) cob_id: CobId,
 }
 
@@ -108,9 +108,14 @@ const NO_TPDO: Verdict = Verdict::NotApplicable(WhyNot::NoTpdo);
 
 /// The first TPDO with an 11-bit COB-ID and a mapping, in PRE-OPERATIONAL and switched on; the others are switched off.
 fn prepare(session: &mut Session<'_, '_>) -> Result<Option<Tpdo>, Error> {
+    prepare_number(session, None)
+}
+
+/// The same for the TPDO with this number (0 for 1800h).
+pub(super) fn prepare_number(session: &mut Session<'_, '_>, number: Option<u16>) -> Result<Option<Tpdo>, Error> {
     let all = tpdos(session)?;
     let mut chosen = None;
-    for tpdo in &all {
+    for tpdo in all.iter().filter(|tpdo| number.is_none_or(|number| number == tpdo.number)) {
         let is_mapped = session.number(tpdo.mapping(0))?.is_some_and(|count| (1..=64).contains(&count));
         if chosen.is_none() && is_mapped && tpdo.cob_id.0 & 0x2000_0000 == 0 && tpdo.cob_id.0 & 0x7ff != 0 {
             chosen = Some(*tpdo);
@@ -128,7 +133,7 @@ fn prepare(session: &mut Session<'_, '_>) -> Result<Option<Tpdo>, Error> {
 }
 
 /// Sets transmission type and event timer. `false` if the device rejects the type or the timer.
-fn set_up(session: &mut Session<'_, '_>, tpdo: Tpdo, kind: u8, timer_ms: u16) -> Result<bool, Error> {
+pub(super) fn set_up(session: &mut Session<'_, '_>, tpdo: Tpdo, kind: u8, timer_ms: u16) -> Result<bool, Error> {
     if session.try_write(tpdo.communication(2), &[kind])?.is_some() {
         return Ok(false);
     }
@@ -297,7 +302,7 @@ pub(super) fn timed(session: &mut Session<'_, '_>) -> Result<Result<Tpdo, Verdic
 }
 
 /// Switches off the events of CiA 404 (delta and limits), so that only the timer sends.
-fn quiet(session: &mut Session<'_, '_>) -> Result<(), Error> {
+pub(super) fn quiet(session: &mut Session<'_, '_>) -> Result<(), Error> {
     let settings = session.settings.of_profile(&[0x133, 0x134, 0x135]);
     for (object, value) in settings {
         if value.iter().any(|&byte| byte != 0) {

@@ -1,9 +1,11 @@
 //! One deviation for each case of the area 404.
 
-use super::deviant::Deviation::{Answers, Sends};
-use super::deviant::Memory;
-use super::table::{Row, ack, is, read, with};
+use super::deviant::Deviation::{Answers, Ignores, Sends};
+use super::deviant::{Memory, NODE};
+use super::table::{Row, ack, is, is_nmt, read, with};
+use super::table_more::is_tpdo;
 use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::CanId;
 
 const UNIT: [u8; 3] = [0x31, 0x61, 1];
 const DIGITS: [u8; 3] = [0x32, 0x61, 1];
@@ -35,6 +37,13 @@ fn integer(frame: Frame, object: [u8; 3], change: fn(i16) -> i16) -> Vec<Frame> 
 /// Counts the acknowledged writes of autozero and offset: two in each case.
 fn count_zeros(memory: &mut Memory, frame: &Frame) {
     memory.count += u32::from(matches!(frame.data(), [0x60, 0x25 | 0x27, 0x61, 1, ..]));
+}
+
+const DELTA: [u8; 3] = [0x33, 0x61, 1];
+const LOWER: [u8; 3] = [0x34, 0x61, 1];
+
+fn is_event_driven(memory: &Memory) -> bool {
+    memory.written([0x00, 0x18, 2]) == 255
 }
 
 pub(super) const ROWS: &[Row] = &[
@@ -145,5 +154,48 @@ pub(super) const ROWS: &[Row] = &[
             count_zeros(memory, &frame);
             if memory.count == 6 { real(frame, [0x30, 0x61, 1], |value| value + 0.5) } else { vec![frame] }
         }),
+    ),
+    (
+        "mh4",
+        "404-60",
+        Sends(|memory, frame| {
+            let is_lost = is_event_driven(memory) && is_tpdo(&frame) && memory.written(DELTA) != 0;
+            if is_lost { Vec::new() } else { vec![frame] }
+        }),
+    ),
+    // A TPDO after each change of the offset, although the delta is large.
+    (
+        "mh4",
+        "404-61",
+        Sends(|memory, frame| {
+            let is_far = f32::from_bits(memory.written(DELTA)) > 1.0;
+            let is_offset = frame.data().starts_with(&[0x60, 0x27, 0x61, 1]);
+            if !is_event_driven(memory) || !is_far || !is_offset {
+                return vec![frame];
+            }
+            let id = CanId::standard(0x180 + u16::from(NODE)).expect("an identifier");
+            vec![frame, Frame::new(id, &[0; 5]).expect("five bytes")]
+        }),
+    ),
+    (
+        "mh4",
+        "404-62",
+        Sends(|memory, frame| {
+            let is_upper = memory.written(DELTA) == 0 && f32::from_bits(memory.written(LOWER)) < 0.0;
+            if is_event_driven(memory) && is_upper && is_tpdo(&frame) { Vec::new() } else { vec![frame] }
+        }),
+    ),
+    (
+        "mh4",
+        "404-63",
+        Sends(|memory, frame| {
+            let is_lower = memory.written(DELTA) == 0 && f32::from_bits(memory.written(LOWER)) > 0.0;
+            if is_event_driven(memory) && is_lower && is_tpdo(&frame) { Vec::new() } else { vec![frame] }
+        }),
+    ),
+    (
+        "mh4",
+        "404-64",
+        Ignores(|memory, _, frame| is_nmt(frame, 0x80, NODE) && memory.nmt[1] == 0x01 && is_event_driven(memory)),
     ),
 ];

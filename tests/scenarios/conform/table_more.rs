@@ -6,7 +6,7 @@ use super::table::{Row, abort, ack, is, is_nmt, read, with};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::CanId;
 
-fn is_tpdo(frame: &Frame) -> bool {
+pub(super) fn is_tpdo(frame: &Frame) -> bool {
     frame.id().number() == 0x180 + u32::from(NODE)
 }
 

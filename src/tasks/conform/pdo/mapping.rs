@@ -40,7 +40,7 @@ pub(in super::super) struct Open {
 }
 
 /// The mapping of the TPDO.
-fn mapping(session: &mut Session<'_, '_>, tpdo: Tpdo) -> Result<Vec<u32>, Error> {
+pub(in super::super) fn mapping(session: &mut Session<'_, '_>, tpdo: Tpdo) -> Result<Vec<u32>, Error> {
     let count = session.number(tpdo.mapping(0))?.unwrap_or(0);
     let mut entries = Vec::new();
     for sub in 1..=u8::try_from(count).unwrap_or(0) {
