@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::{env, fs, io};
 
-/// Folder with one TOML file per entry, and the generated list with the name and the text of each.
+/// Pairs of a folder with one TOML file per entry, and the generated file that lists their names and texts.
 const LISTS: [(&str, &str); 2] = [("src/device/devices", "devices.rs"), ("src/sim/models", "models.rs")];
 
 fn main() -> io::Result<()> {
@@ -23,7 +23,7 @@ fn rerun_if_changed(path: &str) {
     println!("cargo::rerun-if-changed={path}");
 }
 
-/// A Rust expression: an array of names and texts in the order of the names.
+/// Returns a Rust array expression with the name and the text of each file, sorted by name.
 fn entries(folder: &Path) -> io::Result<String> {
     let mut paths =
         fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<Vec<_>>>()?;

@@ -1,4 +1,4 @@
-//! The program: parse, run, exit code.
+//! The program: parses the arguments, runs the command, and returns the exit code.
 
 use cangauge::cli::{exit, parse, run};
 use std::process::ExitCode;

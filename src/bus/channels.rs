@@ -14,11 +14,11 @@ pub struct SdoChannel {
     pub node: NodeId,
     /// The COB-ID of requests to the node.
     pub request: CanId,
-    /// The COB-ID of its answers.
+    /// The COB-ID of answers from the node.
     pub response: CanId,
 }
 
-/// A bus with nodes whose SDO channels have other COB-IDs.
+/// A bus that exchanges the COB-IDs of some SDO channels.
 pub struct SdoChannels<B> {
     bus: B,
     /// Pairs of exchanged COB-IDs: the usual COB-ID, and the COB-ID on the bus.
@@ -34,13 +34,13 @@ impl<B: Bus> SdoChannels<B> {
         SdoChannels { bus, pairs: pairs.collect() }
     }
 
-    fn exchanged(&self, id: CanId) -> CanId {
-        let pair = self.pairs.iter().find(|(usual, own)| *usual == id || *own == id);
-        pair.map_or(id, |&(usual, own)| if id == usual { own } else { usual })
+    fn exchange_id(&self, id: CanId) -> CanId {
+        let pair = self.pairs.iter().find(|(usual, actual)| *usual == id || *actual == id);
+        pair.map_or(id, |&(usual, actual)| if id == usual { actual } else { usual })
     }
 
-    fn frame(&self, frame: &Frame) -> Frame {
-        let id = self.exchanged(frame.id());
+    fn exchange_frame(&self, frame: &Frame) -> Frame {
+        let id = self.exchange_id(frame.id());
         if frame.is_remote() { *frame } else { Frame::new(id, frame.data()).unwrap_or(*frame) }
     }
 }
@@ -51,18 +51,18 @@ impl<B: Bus> Bus for SdoChannels<B> {
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
         match filters {
             Filters::All => self.bus.listen(filters),
-            Filters::Only(ids) => self.bus.listen(&Filters::Only(ids.iter().map(|&id| self.exchanged(id)).collect())),
+            Filters::Only(ids) => self.bus.listen(&Filters::Only(ids.iter().map(|&id| self.exchange_id(id)).collect())),
         }
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        self.bus.send(&self.frame(frame))
+        self.bus.send(&self.exchange_frame(frame))
     }
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
         Ok(match self.bus.receive(deadline)? {
             Event::Frame(mut received) => {
-                received.frame = self.frame(&received.frame);
+                received.frame = self.exchange_frame(&received.frame);
                 Event::Frame(received)
             }
             event => event,
@@ -84,9 +84,9 @@ mod tests {
         let channel = SdoChannel { node: NodeId::new(5).expect("a node-ID"), request: id(0x645), response: id(0x5c5) };
         let bus = SdoChannels::new(crate::bus::memory::MemoryBus::new(crate::bus::memory::Clock::Virtual), &[channel]);
         for (from, to) in [(0x605, 0x645), (0x645, 0x605), (0x585, 0x5c5), (0x5c5, 0x585), (0x705, 0x705)] {
-            assert_eq!(bus.exchanged(id(from)), id(to));
+            assert_eq!(bus.exchange_id(id(from)), id(to));
         }
         let frame: Frame = "605#4000100000000000".parse().expect("a frame");
-        assert_eq!(bus.frame(&frame).to_string(), "645#4000100000000000");
+        assert_eq!(bus.exchange_frame(&frame).to_string(), "645#4000100000000000");
     }
 }

@@ -40,7 +40,7 @@ impl Claim {
     }
 }
 
-/// One name that a process can hold.
+/// A part of the bus that a process can hold. Each part has its own socket name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Part {
     /// The LSS services.
@@ -70,12 +70,12 @@ pub enum IfHeld {
     Continue,
 }
 
-/// The process that holds a claim, as far as it is known. Its text is safe for a terminal.
+/// The process that holds a claim. Unknown parts are `None`. The displayed text is safe for a terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Holder {
     /// The process ID.
     pub process: Option<u32>,
-    /// The name of the user, or the number if it has no name.
+    /// The user name, or the user ID if it has no name.
     pub user: Option<String>,
     /// The name of the program.
     pub program: Option<String>,

@@ -1,5 +1,5 @@
-//! A wrapper that sends every frame through the text of a remote transport and back, for tests. The text arrives in
-//! pieces that are cut at any byte.
+//! A wrapper for tests that encodes every frame as the text of a remote transport and decodes it again. The text
+//! arrives in pieces that are cut at any byte.
 
 use super::socketcand::{self, Messages};
 use super::{BitRateControl, Bus, BusError, Event, Fault, Mono, Received, Stamp, delegate_bus, slcan};
@@ -7,10 +7,10 @@ use crate::canopen::frame::Frame;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// A piece of text arrives this long after the piece before.
+/// The interval between two pieces of text.
 const PIECE_INTERVAL: Duration = Duration::from_micros(150);
 
-/// The text of a transport.
+/// The text format of a transport.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Codec {
     /// The lines of a serial adapter.
@@ -19,15 +19,15 @@ pub enum Codec {
     Socketcand,
 }
 
-/// A bus behind the text of a transport.
+/// A bus whose frames pass through the text format of a transport.
 pub struct Coded<B> {
     bus: B,
     codec: Option<Codec>,
-    /// Chooses the cuts.
+    /// The state of the random numbers that choose the cuts.
     seed: u64,
     lines: slcan::Lines,
     messages: Messages,
-    /// The text that did not arrive yet, and the times of its frames.
+    /// The text that has not arrived yet, and the times of its frames.
     text: Vec<u8>,
     times: VecDeque<Stamp>,
     arrived: VecDeque<Event>,
@@ -51,14 +51,14 @@ impl<B: Bus> Coded<B> {
         &mut self.bus
     }
 
-    /// A number from 0 to `most`.
-    fn random(&mut self, most: usize) -> usize {
+    /// Returns a random number from 0 to `max`.
+    fn random(&mut self, max: usize) -> usize {
         self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        usize::try_from(self.seed >> 33).unwrap_or(0) % (most + 1)
+        usize::try_from(self.seed >> 33).unwrap_or(0) % (max + 1)
     }
 
-    /// Adds the text of a received frame, up to a cut.
-    fn take_in(&mut self, received: &Received, codec: Codec) {
+    /// Encodes a received frame, and decodes the waiting text up to a random cut.
+    fn encode_received(&mut self, received: &Received, codec: Codec) {
         let text = match codec {
             Codec::Slcan => slcan::command(&received.frame) + "\r",
             Codec::Socketcand if received.frame.is_remote() => return,
@@ -67,11 +67,11 @@ impl<B: Bus> Coded<B> {
         self.text.extend(text.bytes());
         self.times.push_back(received.at);
         let cut = self.random(self.text.len());
-        self.arrive(cut, codec);
+        self.decode_waiting(cut, codec);
     }
 
-    /// Decodes this many bytes of the text.
-    fn arrive(&mut self, count: usize, codec: Codec) {
+    /// Decodes the first `count` bytes of the waiting text.
+    fn decode_waiting(&mut self, count: usize, codec: Codec) {
         let piece: Vec<u8> = self.text.drain(..count).collect();
         let (times, arrived, now) = (&mut self.times, &mut self.arrived, self.bus.now());
         let mut push = |frame: Option<Frame>| {
@@ -86,8 +86,8 @@ impl<B: Bus> Coded<B> {
         }
     }
 
-    /// The frame after it was sent as text.
-    fn sent(&mut self, frame: &Frame, codec: Codec) -> Result<Frame, BusError> {
+    /// Encodes a frame as text, and returns the decoded frame.
+    fn round_trip(&mut self, frame: &Frame, codec: Codec) -> Result<Frame, BusError> {
         let text = match codec {
             Codec::Slcan => slcan::command(frame) + "\r",
             Codec::Socketcand => socketcand::send_message(frame)?,
@@ -120,7 +120,7 @@ impl<B: Bus> Bus for Coded<B> {
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let Some(codec) = self.codec else { return self.bus.send(frame) };
-        let frame = self.sent(frame, codec)?;
+        let frame = self.round_trip(frame, codec)?;
         self.bus.send(&frame)
     }
 
@@ -132,8 +132,8 @@ impl<B: Bus> Bus for Coded<B> {
             }
             let due = (!self.text.is_empty()).then(|| self.bus.mono() + PIECE_INTERVAL);
             match self.bus.receive(due.map_or(deadline, |due| due.min(deadline)))? {
-                Event::Frame(received) => self.take_in(&received, codec),
-                Event::Timeout if due.is_some() => self.arrive(self.text.len(), codec),
+                Event::Frame(received) => self.encode_received(&received, codec),
+                Event::Timeout if due.is_some() => self.decode_waiting(self.text.len(), codec),
                 event => return Ok(event),
             }
         }
@@ -161,7 +161,7 @@ mod tests {
             assert_eq!(received, expected.collect::<Vec<_>>(), "{codec:?} {seed}");
             for text in texts {
                 let frame = text.parse().expect("a frame");
-                assert_eq!(bus.sent(&frame, codec).ok(), is_carried(text).then_some(frame), "{codec:?} {seed}");
+                assert_eq!(bus.round_trip(&frame, codec).ok(), is_carried(text).then_some(frame), "{codec:?} {seed}");
             }
         }
     }

@@ -16,7 +16,7 @@ pub struct FaultPlan {
     pub lose: BTreeSet<u64>,
     /// Received frames that arrive twice.
     pub duplicate: BTreeSet<u64>,
-    /// Received frames that arrive late, after later frames.
+    /// Received frames that are delayed, so that later frames can overtake them.
     pub delay: BTreeMap<u64, Duration>,
     /// Received frames with one changed byte: its index (modulo the length) and the bits to invert.
     pub garble: BTreeMap<u64, (usize, u8)>,
@@ -42,10 +42,10 @@ pub struct Faulty<B> {
     sends: u64,
     received: u64,
     /// Received frames to deliver, in order of their time.
-    held: VecDeque<Received>,
+    pending: VecDeque<Received>,
     /// Whether the interface was up in the last report.
     is_up: bool,
-    is_off: bool,
+    is_bus_off: bool,
     /// Frames that wait in a controller that is bus-off.
     waiting: VecDeque<Frame>,
 }
@@ -53,8 +53,8 @@ pub struct Faulty<B> {
 impl<B: Bus> Faulty<B> {
     /// Injects the faults of `plan` into `bus`.
     pub fn new(bus: B, plan: FaultPlan) -> Faulty<B> {
-        let (held, waiting) = (VecDeque::new(), VecDeque::new());
-        Faulty { bus, plan, sends: 0, received: 0, held, is_up: true, is_off: false, waiting }
+        let (pending, waiting) = (VecDeque::new(), VecDeque::new());
+        Faulty { bus, plan, sends: 0, received: 0, pending, is_up: true, is_bus_off: false, waiting }
     }
 
     /// The inner bus.
@@ -75,32 +75,32 @@ impl<B: Bus> Faulty<B> {
         }
     }
 
-    fn is_off_at(&self, now: Mono) -> bool {
-        self.plan.bus_off.is_some_and(|from| from <= now) && self.restart().is_none_or(|at| now < at)
+    fn is_bus_off_at(&self, now: Mono) -> bool {
+        self.plan.bus_off.is_some_and(|from| from <= now) && self.restart_time().is_none_or(|at| now < at)
     }
 
-    /// When a bus-off controller restarts.
-    fn restart(&self) -> Option<Mono> {
+    /// Returns the time at which the bus-off controller restarts.
+    fn restart_time(&self) -> Option<Mono> {
         self.plan.bus_off.zip(self.plan.restart_after).map(|(from, length)| from + length)
     }
 
-    /// The next change of the interface after `now`.
+    /// Returns the time of the next change of the interface after `now`.
     fn next_change(&self, now: Mono) -> Option<Mono> {
         let down =
             self.plan.down.into_iter().flat_map(|(from, length)| [Some(from), length.map(|length| from + length)]);
-        down.flatten().chain(self.plan.bus_off).chain(self.restart()).filter(|moment| *moment > now).min()
+        down.flatten().chain(self.plan.bus_off).chain(self.restart_time()).filter(|moment| *moment > now).min()
     }
 
-    /// A change of the interface that was not reported yet.
+    /// Returns a change of the interface that was not reported yet.
     fn unreported_change(&mut self) -> Option<Event> {
         let now = self.bus.now();
         if self.is_up_at(now.mono) != self.is_up {
             self.is_up = !self.is_up;
             return Some(Event::Link(self.is_up));
         }
-        if self.is_off_at(now.mono) != self.is_off {
-            self.is_off = !self.is_off;
-            let fault = if self.is_off { Fault::BusOff } else { Fault::Restarted };
+        if self.is_bus_off_at(now.mono) != self.is_bus_off {
+            self.is_bus_off = !self.is_bus_off;
+            let fault = if self.is_bus_off { Fault::BusOff } else { Fault::Restarted };
             return Some(Event::Fault(fault, now));
         }
         None
@@ -108,7 +108,7 @@ impl<B: Bus> Faulty<B> {
 
     /// After a restart, sends the waiting frames until the queue of the inner bus is full.
     fn send_waiting(&mut self) -> Result<(), BusError> {
-        while !self.is_off_at(self.bus.now().mono)
+        while !self.is_bus_off_at(self.bus.now().mono)
             && let Some(frame) = self.waiting.front()
         {
             match self.bus.send(frame) {
@@ -120,18 +120,18 @@ impl<B: Bus> Faulty<B> {
         Ok(())
     }
 
-    fn hold(&mut self, received: Received) {
-        let place = self.held.partition_point(|other| other.at.mono <= received.at.mono);
-        self.held.insert(place, received);
+    fn add_pending(&mut self, received: Received) {
+        let place = self.pending.partition_point(|other| other.at.mono <= received.at.mono);
+        self.pending.insert(place, received);
     }
 
-    /// A received frame after garbling and truncation.
+    /// Returns a received frame after garbling and truncation.
     fn altered(&self, number: u64, frame: Frame) -> Frame {
         let mut data = frame.data().to_vec();
-        if let Some(&(place, turned)) = self.plan.garble.get(&number)
-            && let Some(place) = place.checked_rem(data.len())
+        if let Some(&(index, inverted_bits)) = self.plan.garble.get(&number)
+            && let Some(index) = index.checked_rem(data.len())
         {
-            data[place] ^= turned;
+            data[index] ^= inverted_bits;
         }
         data.truncate(self.plan.truncate.get(&number).copied().unwrap_or(usize::MAX));
         // A remote frame has no data bytes.
@@ -143,18 +143,18 @@ impl<B: Bus> Faulty<B> {
         let number = self.received;
         self.received += 1;
         let now = self.bus.now().mono;
-        if self.plan.lose.contains(&number) || !self.is_up_at(now) || self.is_off_at(now) {
+        if self.plan.lose.contains(&number) || !self.is_up_at(now) || self.is_bus_off_at(now) {
             return;
         }
         received.frame = self.altered(number, received.frame);
-        if let Some(&by) = self.plan.delay.get(&number) {
-            received.at.mono = received.at.mono + by;
-            received.at.wall = received.at.wall + by;
+        if let Some(&delay) = self.plan.delay.get(&number) {
+            received.at.mono = received.at.mono + delay;
+            received.at.wall = received.at.wall + delay;
         }
         if self.plan.duplicate.contains(&number) {
-            self.hold(received);
+            self.add_pending(received);
         }
-        self.hold(received);
+        self.add_pending(received);
     }
 }
 
@@ -173,7 +173,7 @@ impl<B: Bus> Bus for Faulty<B> {
             return Err(BusError::Down(self.bus.name().to_owned()));
         }
         self.send_waiting()?;
-        if self.is_off_at(now) || !self.waiting.is_empty() {
+        if self.is_bus_off_at(now) || !self.waiting.is_empty() {
             if self.waiting.len() >= BUS_OFF_QUEUE_LENGTH {
                 return Err(BusError::QueueFull);
             }
@@ -196,11 +196,11 @@ impl<B: Bus> Bus for Faulty<B> {
             if let Some(change) = self.unreported_change() {
                 return Ok(change);
             }
-            let due = self.held.front().map(|first| first.at.mono);
+            let due = self.pending.front().map(|first| first.at.mono);
             let now = self.bus.now().mono;
             if let Some(due) = due
                 && due <= now
-                && let Some(first) = self.held.pop_front()
+                && let Some(first) = self.pending.pop_front()
             {
                 return Ok(Event::Frame(first));
             }

@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 /// The first bytes of a gzip file.
 pub(super) const GZIP: &[u8] = b"\x1f\x8b";
 
-/// The size of the buffer of a file that is read as a whole.
+/// The buffer size for a file that is read to its end.
 const BUFFER_SIZE: usize = 1 << 18;
 
-/// Opens a file to read its text; `-` is standard input. A file of gzip is unpacked.
+/// Opens a file to read its text; `-` is standard input. A gzip file is decompressed.
 ///
 /// # Errors
 /// The file cannot be opened or read.
@@ -29,7 +29,7 @@ pub fn open_text(path: &Path) -> io::Result<Box<dyn BufRead>> {
     Ok(Box::new(BufReader::with_capacity(BUFFER_SIZE, MultiGzDecoder::new(reader))))
 }
 
-/// Another open file of the same inode has the lock.
+/// The file cannot be locked: it is already open elsewhere and locked there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Locked {
     /// The process that has the lock, if known.
@@ -41,7 +41,7 @@ pub struct Locked {
 /// Locks a regular file until it is closed, so that it has only one writer. Other files are not locked.
 ///
 /// # Errors
-/// Another process is writing the file, or this process has opened it under another name.
+/// Another process is writing the file, or this process has locked it through another open file.
 pub fn lock(file: &File) -> Result<(), Locked> {
     if !file.metadata().is_ok_and(|metadata| metadata.is_file()) {
         return Ok(());
@@ -56,7 +56,7 @@ pub fn lock(file: &File) -> Result<(), Locked> {
     }
 }
 
-/// The process that has the lock, from `/proc/locks`; `None` if the file does not show exactly one process.
+/// Returns the process that has the lock, from `/proc/locks`; `None` unless exactly one process has it.
 fn holder(file: &File) -> Option<u32> {
     let (_, inode) = identity(&file.metadata().ok()?)?;
     let locks = std::fs::read_to_string("/proc/locks").ok()?;
@@ -64,13 +64,13 @@ fn holder(file: &File) -> Option<u32> {
     holders.next().filter(|_| holders.next().is_none())
 }
 
-/// The process in a line of `/proc/locks`: `1: FLOCK ADVISORY WRITE 4711 fd:01:1234 0 EOF`. A line with `->` is a
-/// process that waits for the lock.
+/// Parses the process from a line of `/proc/locks`: `1: FLOCK ADVISORY WRITE 4711 fd:01:1234 0 EOF`. A line with `->`
+/// is ignored, because its process still waits for the lock.
 fn holder_in(line: &str, inode: u64) -> Option<u32> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [_, "FLOCK", _, _, process, place, ..] = words.as_slice() else { return None };
     let found: u64 = place.rsplit(':').next()?.parse().ok()?;
-    // 0 is a process of another namespace.
+    // 0 stands for a process in another namespace.
     process.parse().ok().filter(|&process| found == inode && process != 0)
 }
 
@@ -83,7 +83,7 @@ pub enum NameChange {
     Deleted,
 }
 
-/// The change of the name of an open file, from its metadata; `None` if `path` is still its name.
+/// Checks whether an open file was renamed or deleted; `None` if `path` is still its name.
 pub fn name_change(metadata: &Metadata, path: &Path) -> Option<NameChange> {
     let found = path.metadata().ok().and_then(|metadata| identity(&metadata));
     match identity(metadata) {
@@ -98,7 +98,7 @@ pub fn is_same(one: &Metadata, other: &Metadata) -> bool {
     identity(one).is_some_and(|one| identity(other) == Some(one))
 }
 
-/// Device and inode; `None` if the system has none.
+/// Returns the device and inode numbers; `None` if the system has none.
 #[cfg(unix)]
 pub fn identity(metadata: &Metadata) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt;
@@ -110,7 +110,7 @@ fn links(metadata: &Metadata) -> u64 {
     std::os::unix::fs::MetadataExt::nlink(metadata)
 }
 
-/// Device and inode; `None` on this system.
+/// Returns `None`: this system has no inode numbers.
 #[cfg(not(unix))]
 pub fn identity(_: &Metadata) -> Option<(u64, u64)> {
     None
@@ -124,8 +124,8 @@ fn links(_: &Metadata) -> u64 {
 /// The interval at which a FIFO is checked for a reader.
 const READER_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Waits until a program reads from a FIFO, because opening it would block. Returns the waiting time, and a file that
-/// keeps the FIFO open until the caller has opened it. Returns at once for other kinds of files.
+/// Waits until a program has opened a FIFO for reading, because opening it for writing would block until then. Returns
+/// the waiting time, and a file that keeps the FIFO open until the caller has opened it. Does not wait for other files.
 ///
 /// # Errors
 /// [`io::ErrorKind::TimedOut`] after `limit`, [`io::ErrorKind::Interrupted`] after a signal.
@@ -152,7 +152,7 @@ pub fn wait_for_reader(path: &Path, limit: Option<Duration>) -> io::Result<(Dura
     }
 }
 
-/// On other systems, the caller waits when it opens a FIFO without a reader.
+/// Does not wait on this system: the caller waits when it opens a FIFO without a reader.
 ///
 /// # Errors
 /// None.

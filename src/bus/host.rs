@@ -1,14 +1,14 @@
-//! The name of this computer, and identifiers that differ from run to run.
+//! The name of this computer, and random identifiers of runs.
 
 use super::time::Wall;
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
 
-/// The longest host name of POSIX systems, with its end.
+/// The length of the longest POSIX host name, including the zero byte at its end.
 #[cfg(unix)]
-const LONGEST_NAME: usize = 256;
+const MAX_NAME_LENGTH: usize = 256;
 
-/// The host name without its domain; `host` if it is unknown.
+/// Returns the host name without the domain; `host` if it is unknown.
 pub fn host_name() -> String {
     let name = full_name().unwrap_or_default();
     let first = name.split('.').next().unwrap_or_default();
@@ -18,9 +18,9 @@ pub fn host_name() -> String {
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "the standard library does not know the host name")]
 fn full_name() -> Option<String> {
-    let mut name = [0u8; LONGEST_NAME];
+    let mut name = [0u8; MAX_NAME_LENGTH];
     // SAFETY: the pointer and the length describe `name`. The last byte stays 0, so the text has an end.
-    let result = unsafe { libc::gethostname(name.as_mut_ptr().cast(), LONGEST_NAME - 1) };
+    let result = unsafe { libc::gethostname(name.as_mut_ptr().cast(), MAX_NAME_LENGTH - 1) };
     let text = name.split(|&byte| byte == 0).next()?;
     (result == 0).then(|| String::from_utf8_lossy(text).into_owned())
 }
@@ -30,14 +30,14 @@ fn full_name() -> Option<String> {
     None
 }
 
-/// A new identifier of a run: the time of its start and eight random hexadecimal digits, `20261129T150102-7f3a9c21`.
+/// Returns a new run ID: the start time and eight random hexadecimal digits, `20261129T150102-7f3a9c21`.
 pub fn new_run_id(start: Wall) -> String {
     let time = humantime::format_rfc3339_seconds(start.system_time()).to_string();
     let time: String = time.chars().filter(char::is_ascii_alphanumeric).collect();
     format!("{}-{}", time.trim_end_matches('Z'), random_word())
 }
 
-/// Eight random hexadecimal digits. They are not secret.
+/// Returns eight random hexadecimal digits. They are not suitable as a secret.
 pub fn random_word() -> String {
     // The standard library seeds each hasher from the random numbers of the system.
     let mut hasher = RandomState::new().build_hasher();

@@ -14,10 +14,10 @@ const MAX_SLEEP: Duration = Duration::from_secs(100 * 365 * 24 * 3600);
 /// Receives the signals SIGINT and SIGTERM.
 ///
 /// Each instance receives each signal that arrives during its lifetime, so two buses in one process both receive it.
-/// From the first instance on, Ctrl-C no longer ends the program. The owner of an instance must check for it.
+/// While an instance exists, Ctrl-C does not end the program. The owner of the instance must check for signals.
 #[derive(Debug)]
 pub struct Interrupts {
-    /// Set after the byte is written to the pipe, so that a busy reader needs only one load.
+    /// Set after the byte of a signal is written to the pipe, so that a busy reader needs only one load.
     raised: Arc<AtomicBool>,
     pending: usize,
     registered: Vec<SigId>,
@@ -33,12 +33,12 @@ impl Interrupts {
     pub fn new() -> io::Result<Interrupts> {
         #[cfg(unix)]
         if !ignores_hangup() {
-            return Interrupts::on(&[SIGINT, SIGTERM, signal_hook::consts::SIGHUP]);
+            return Interrupts::for_signals(&[SIGINT, SIGTERM, signal_hook::consts::SIGHUP]);
         }
-        Interrupts::on(&[SIGINT, SIGTERM])
+        Interrupts::for_signals(&[SIGINT, SIGTERM])
     }
 
-    /// Whether there is a signal that was not reported yet. Cheap if there is none.
+    /// Returns whether a signal was not reported yet, and marks it as reported. Fast if there is none.
     pub fn take(&mut self) -> bool {
         if self.raised.load(Ordering::Acquire) {
             self.collect();
@@ -59,8 +59,8 @@ impl Interrupts {
     }
 }
 
-/// Reads lines from stdin in a thread. Each is followed by an interrupt, which wakes a program that waits on a bus.
-/// Call it when the bus is open.
+/// Reads lines from stdin in a thread. Raises SIGINT after each line, to wake a program that waits on a bus. Call this
+/// only after the bus is opened, because SIGINT would end the program.
 pub fn lines_with_interrupts() -> std::sync::mpsc::Receiver<String> {
     let (sender, lines) = std::sync::mpsc::channel();
     ignore_background_reads();
@@ -74,11 +74,11 @@ pub fn lines_with_interrupts() -> std::sync::mpsc::Receiver<String> {
     lines
 }
 
-/// From now on, reading the terminal in the background is an error; it does not stop the process.
+/// Ignores SIGTTIN: reading the terminal in the background then returns an error and does not stop the process.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "the standard library cannot set the action of a signal")]
 fn ignore_background_reads() {
-    // SAFETY: SIG_IGN is a valid action, and no handler of this program is for this signal.
+    // SAFETY: SIG_IGN is a valid action, and this program has no handler for this signal.
     unsafe { libc::signal(libc::SIGTTIN, libc::SIG_IGN) };
 }
 
@@ -95,8 +95,8 @@ pub fn survive_file_size_limit() -> io::Result<()> {
     Ok(())
 }
 
-/// Whether SIGHUP was ignored when the program started, as `nohup` does. Read once, because the handlers change the
-/// result.
+/// Whether SIGHUP was ignored when the program started (`nohup`). Read only once, because handlers of this program
+/// change the result.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "the standard library cannot read the action of a signal")]
 fn ignores_hangup() -> bool {
@@ -114,7 +114,7 @@ fn ignores_hangup() -> bool {
 
 #[cfg(unix)]
 impl Interrupts {
-    fn on(signals: &[c_int]) -> io::Result<Interrupts> {
+    fn for_signals(signals: &[c_int]) -> io::Result<Interrupts> {
         // Each byte in the pipe is one signal. It also wakes a waiting poll.
         let (pipe, write) = std::os::unix::net::UnixStream::pair()?;
         pipe.set_nonblocking(true)?;
@@ -165,7 +165,7 @@ impl Interrupts {
 /// periodically.
 #[cfg(not(unix))]
 impl Interrupts {
-    fn on(signals: &[c_int]) -> io::Result<Interrupts> {
+    fn for_signals(signals: &[c_int]) -> io::Result<Interrupts> {
         let raised = Arc::new(AtomicBool::new(false));
         let mut new = Interrupts { raised, pending: 0, registered: Vec::new() };
         for &signal in signals {
@@ -211,8 +211,8 @@ mod tests {
 
     #[test]
     fn each_signal_is_reported_once() -> io::Result<()> {
-        let mut first = Interrupts::on(&[SIGUSR1])?;
-        let mut second = Interrupts::on(&[SIGUSR1])?;
+        let mut first = Interrupts::for_signals(&[SIGUSR1])?;
+        let mut second = Interrupts::for_signals(&[SIGUSR1])?;
         assert!(!first.take());
         low_level::raise(SIGUSR1)?;
         low_level::raise(SIGUSR1)?;
@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn a_signal_ends_a_sleep() -> io::Result<()> {
-        let mut interrupts = Interrupts::on(&[SIGUSR2])?;
+        let mut interrupts = Interrupts::for_signals(&[SIGUSR2])?;
         let start = Instant::now();
         assert!(!interrupts.wait_until(start + Duration::from_millis(20)));
         assert!(start.elapsed() >= Duration::from_millis(20));

@@ -101,8 +101,8 @@ pub trait Bus: BitRateControl {
         None
     }
 
-    /// The number of frames that the kernel dropped and that no [`Event::Dropped`] reported. That event comes with the
-    /// next frame, so drops after the last frame are reported only here. Each frame is counted once.
+    /// Returns the number of dropped frames that no [`Event::Dropped`] reported. The kernel reports drops with the next
+    /// frame, so drops after the last frame are reported only here. Each dropped frame is counted once.
     fn late_drops(&mut self) -> u32 {
         0
     }
@@ -119,7 +119,7 @@ pub trait Bus: BitRateControl {
 
 /// Reads, sets and restores the bit rate of the interface of a [`Bus`].
 ///
-/// A transport without such control implements the trait with an empty block.
+/// A transport that cannot control the bit rate implements the trait with an empty block.
 pub trait BitRateControl {
     /// The bit rate in bit/s, if it is known.
     fn bit_rate(&self) -> Option<u32> {
@@ -143,7 +143,7 @@ pub trait BitRateControl {
         self.can_set_bit_rate()
     }
 
-    /// Restores the bit rate, mode and up/down state before the first [`BitRateControl::set_bit_rate`]. Does nothing if
+    /// Restores the bit rate, mode and up/down state from before the first [`BitRateControl::set_bit_rate`]. Does nothing if
     /// the bit rate was not set.
     ///
     /// # Errors
@@ -314,7 +314,7 @@ pub enum Filters {
 }
 
 impl Filters {
-    /// The filters that pass each frame that one of `each` passes.
+    /// Combines filters: the result passes each frame that at least one of `each` passes.
     pub fn any_of<'a>(each: impl Iterator<Item = &'a Filters>) -> Filters {
         let mut all = Vec::new();
         for filters in each {

@@ -3,49 +3,49 @@
 use crate::bus::{Mono, Stamp, Wall};
 use std::time::Duration;
 
-/// The largest drift between the two clocks, in parts per million. Crystals are off by at most 100, and the host clock
-/// is slewed by up to 500.
-const DRIFT: i128 = 600;
-/// The longest time of a frame from the interface to the kernel. If it seems longer, the clock of the interface was set
-/// or restarted.
-const LATENCY: Duration = Duration::from_millis(50);
+/// The largest drift between the two clocks, in parts per million. Crystals deviate by at most 100, and the host
+/// corrects its clock by up to 500.
+const MAX_DRIFT_PPM: i128 = 600;
+/// The longest delay of a frame between the interface and the kernel. A longer delay means that the clock of the
+/// interface was set or restarted.
+const MAX_LATENCY: Duration = Duration::from_millis(50);
 
 /// Some drivers report the receive time of a frame by the clock of the interface. A busy host does not delay this
-/// clock, so its intervals are better than those of the kernel. But the clock starts at any value, drifts, and is never
-/// set.
+/// clock, so its intervals are more accurate than intervals of kernel times. But the clock starts at any value, drifts,
+/// and is not synchronized.
 ///
 /// The kernel receives a frame only after the interface. So the smallest difference between the two times is the offset
 /// of the clocks. The offset may grow only as fast as the clocks can drift. The result is never later than the time of
-/// the kernel, and at most [`LATENCY`] earlier. It never goes backwards.
+/// the kernel, and at most [`MAX_LATENCY`] earlier. It never goes backwards.
 #[derive(Debug, Default)]
 pub(super) struct OwnClock {
-    /// The last reading, and the offset of the host clock from it, in nanoseconds.
-    known: Option<(i128, i128)>,
+    /// The last time of the interface clock, and the offset of the host clock from it, in nanoseconds.
+    last_offset: Option<(i128, i128)>,
     /// When the last frame was received.
     last: Mono,
 }
 
 impl OwnClock {
-    /// The time of a frame that the interface received at `own` and the kernel at `kernel`.
+    /// Returns the time of a frame that the interface received at `own` (on its clock) and the kernel at `kernel`.
     pub(super) fn place(&mut self, own: Duration, kernel: Stamp) -> Stamp {
         let own = nanoseconds(own);
-        let ahead = nanoseconds(kernel.mono.since_start()) - own;
-        let least = match self.known {
-            None => ahead,
-            Some((before, least)) => {
-                let grown = least + (own - before).max(0) * DRIFT / 1_000_000;
-                if ahead - grown > nanoseconds(LATENCY) { ahead } else { grown.min(ahead) }
+        let offset = nanoseconds(kernel.mono.since_start()) - own;
+        let min_offset = match self.last_offset {
+            None => offset,
+            Some((last_own, min_offset)) => {
+                let grown_offset = min_offset + (own - last_own).max(0) * MAX_DRIFT_PPM / 1_000_000;
+                if offset - grown_offset > nanoseconds(MAX_LATENCY) { offset } else { grown_offset.min(offset) }
             }
         };
-        self.known = Some((own, least));
-        let late = Duration::from_nanos(u64::try_from(ahead - least).unwrap_or(0));
-        let mono = (kernel.mono - late).max(self.last).min(kernel.mono);
+        self.last_offset = Some((own, min_offset));
+        let delay = Duration::from_nanos(u64::try_from(offset - min_offset).unwrap_or(0));
+        let mono = (kernel.mono - delay).max(self.last).min(kernel.mono);
         self.last = mono;
         let wall = kernel.wall.since_epoch().saturating_sub(kernel.mono.since(mono));
         Stamp { mono, wall: Wall::at(wall) }
     }
 
-    /// Records the time of a frame that has only a kernel time. A later frame then gets no earlier time.
+    /// Records the time of a frame that has only a kernel time. A later frame then never gets an earlier time.
     pub(super) fn pass(&mut self, kernel: Stamp) {
         self.last = kernel.mono;
     }
@@ -75,10 +75,10 @@ mod tests {
         if noise.is_multiple_of(50) { us(20_000) } else { us(100 + noise % 2000) }
     }
 
-    /// The reading of a clock with a deviation of this many parts per million.
-    fn shown(length: Duration, wrong: i32) -> Duration {
-        let by = length * wrong.unsigned_abs() / 1_000_000;
-        if wrong < 0 { length - by } else { length + by }
+    /// Returns the time on a clock that deviates by `ppm` parts per million.
+    fn clock_time(length: Duration, ppm: i32) -> Duration {
+        let deviation = length * ppm.unsigned_abs() / 1_000_000;
+        if ppm < 0 { length - deviation } else { length + deviation }
     }
 
     #[test]
@@ -89,7 +89,7 @@ mod tests {
             let mut last = None;
             for n in 0..180_000 {
                 let on_the_bus = us(n * 10_000);
-                let own = Duration::from_secs(3600) + shown(on_the_bus, wrong);
+                let own = Duration::from_secs(3600) + clock_time(on_the_bus, wrong);
                 let stamp = clock.place(own, kernel(on_the_bus + latency(n)));
                 let off = stamp.mono.since_start().saturating_sub(on_the_bus);
                 assert!(stamp.mono.since_start() >= on_the_bus, "{n}: before it was sent");
@@ -118,7 +118,7 @@ mod tests {
             };
             let at = kernel(us(n * 1000) + latency(n).min(us(900)));
             let stamp = clock.place(own, at);
-            assert!(stamp.mono <= at.mono && at.mono.since(stamp.mono) <= LATENCY, "{n}: {stamp:?} for {at:?}");
+            assert!(stamp.mono <= at.mono && at.mono.since(stamp.mono) <= MAX_LATENCY, "{n}: {stamp:?} for {at:?}");
             assert!(stamp.mono >= last, "{n}: {stamp:?} after {last:?}");
             last = stamp.mono;
         }

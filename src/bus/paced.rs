@@ -1,6 +1,6 @@
 //! A wrapper around a bus that delays SDO requests if other nodes send, so that the bus load stays below a limit.
 //! Requests and answers have priority over heartbeats (CiA 301, 7.3.3): without a limit, a long series of reads delays
-//! the heartbeats of a machine that runs.
+//! the heartbeats in a running machine.
 
 use super::{BitRateControl, Bus, BusError, Event, Filters, Mode, Mono, delegate_bus};
 use crate::canopen::frame::Frame;
@@ -14,32 +14,32 @@ use std::time::Duration;
 pub const SHARED_LOAD: u8 = 50;
 
 /// The bus load in percent that requests and their answers may always use, even if other traffic is heavier.
-const LEAST_LOAD: u8 = 5;
+const MIN_LOAD: u8 = 5;
 
 /// The load of other traffic in percent from which the bus counts as shared. Heartbeats alone stay below it.
-const TRAFFIC: u8 = 1;
+const TRAFFIC_LOAD: u8 = 1;
 
-/// How much other traffic there must be before the bus counts as shared: at [`TRAFFIC`] percent, its frames would need
-/// this time. A burst of heartbeats needs less.
+/// The bus counts as shared if the frames of other nodes would need more than this time at a load of [`TRAFFIC_LOAD`]
+/// percent (6 ms of frames). A burst of heartbeats needs less.
 const TRAFFIC_TIME: Duration = Duration::from_millis(600);
 
-/// The longest such time that is counted, so that a bus counts as shared for 1 s after the last frame of other nodes.
-const LONGEST_TRAFFIC: Duration = Duration::from_millis(1600);
+/// The upper limit of this time, so that the bus counts as shared for at most 1 s after the last frame of other nodes.
+const MAX_TRAFFIC_TIME: Duration = Duration::from_millis(1600);
 
 /// Frames may be sent this much earlier than the limit allows, if fewer were sent before.
 const CREDIT: Duration = Duration::from_millis(4);
 
-/// Traffic before a request delays it by at most this time.
+/// The longest delay of a request because of earlier traffic.
 const LONGEST_WAIT: Duration = Duration::from_millis(100);
 
 /// The longest time between two requests on a bus that is always above the limit.
 const LONGEST_PAUSE: Duration = Duration::from_millis(500);
 
-/// The number of requests from which traffic is measured. A command with fewer requests is not a load.
-const MANY: u32 = 16;
+/// The number of requests after which the measurement starts. Fewer requests do not load the bus.
+const MIN_REQUESTS: u32 = 16;
 
 /// The measurement ends when no request was sent for this time.
-const IDLE: Duration = Duration::from_secs(1);
+const IDLE_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A bus with a limit for the load of SDO transfers. While a request must wait, [`Bus::send`] returns
 /// [`BusError::QueueFull`].
@@ -51,26 +51,26 @@ pub struct Paced<B> {
     limit: (u8, bool),
     /// The bit rate in bit/s, read when first needed.
     bit_rate: Cell<Option<Option<u32>>>,
-    /// The COB-IDs of requests and answers that are not the usual ones.
+    /// Pairs of COB-IDs for requests and answers, for nodes that do not use the usual ones.
     channels: Vec<(CanId, CanId)>,
-    /// The frames that the user of this bus wants.
+    /// The filters of the caller. During the measurement, the inner bus receives all frames.
     filters: Filters,
     /// The measurement; `None` if there were few requests.
     load: Option<Load>,
     /// The number of requests, and when the last one was sent.
     requests: (u32, Mono),
-    /// The answers to requests, by COB-ID.
+    /// The COB-IDs of the answers to all requests so far.
     answers: BTreeSet<CanId>,
 }
 
-/// The load of the bus. Each moment is when a bus with a certain load would have carried the frames so far.
+/// The measured load. Each `Mono` is the moment at which the frames so far would end if sent with a given load.
 struct Load {
     bit_rate: u32,
-    /// All frames, at the limit.
+    /// For all frames, with the load limit.
     limit: Mono,
-    /// Requests and answers, at [`LEAST_LOAD`].
+    /// For requests and answers, with [`MIN_LOAD`].
     least: Mono,
-    /// Frames of other nodes, at [`TRAFFIC`].
+    /// For frames of other nodes, with [`TRAFFIC_LOAD`].
     traffic: Mono,
 }
 
@@ -79,7 +79,7 @@ impl Load {
         Load { bit_rate, limit: now, least: now, traffic: now }
     }
 
-    /// The time of a frame on a bus with this load in percent.
+    /// Returns the interval at which frames of this length cause a load of `percent`.
     fn time(&self, frame: &Frame, percent: u8) -> Duration {
         frame_time(frame, self.bit_rate) * 100 / u32::from(percent)
     }
@@ -90,11 +90,11 @@ impl Load {
 
     fn on_request(&mut self, frame: &Frame, now: Mono) {
         // The answer has the same length in most cases.
-        self.least = (self.least.max(now) + 2 * self.time(frame, LEAST_LOAD)).min(now + LONGEST_PAUSE);
+        self.least = (self.least.max(now) + 2 * self.time(frame, MIN_LOAD)).min(now + LONGEST_PAUSE);
     }
 
     fn on_traffic(&mut self, frame: &Frame, now: Mono) {
-        self.traffic = (self.traffic.max(now) + self.time(frame, TRAFFIC)).min(now + LONGEST_TRAFFIC);
+        self.traffic = (self.traffic.max(now) + self.time(frame, TRAFFIC_LOAD)).min(now + MAX_TRAFFIC_TIME);
     }
 
     fn is_shared(&self, now: Mono) -> bool {
@@ -110,28 +110,28 @@ impl<B: Bus> Paced<B> {
     /// Limits the load of `bus`. `limit` is in percent; if it is `None`, [`SHARED_LOAD`] applies while other nodes
     /// send. `channels` are further COB-IDs of SDO requests and answers.
     pub fn new(bus: B, limit: Option<u8>, channels: Vec<(CanId, CanId)>) -> Paced<B> {
-        let limit = (limit.unwrap_or(SHARED_LOAD).clamp(LEAST_LOAD, 100), limit.is_some());
+        let limit = (limit.unwrap_or(SHARED_LOAD).clamp(MIN_LOAD, 100), limit.is_some());
         let (bit_rate, filters, load) = (Cell::new(None), Filters::All, None);
         let (requests, answers) = ((0, Mono::START), BTreeSet::new());
         Paced { bus, limit, bit_rate, channels, filters, load, requests, answers }
     }
 
-    /// The COB-ID of the answer, if `frame` is an SDO request. Aborts are not delayed.
+    /// Returns the COB-ID of the answer if `frame` is an SDO request to be counted. Aborts are not delayed.
     fn answer_of(&self, frame: &Frame) -> Option<CanId> {
         let is_abort = frame.data().first() == Some(&0x80);
         if frame.is_remote() || frame.len() != 8 || is_abort {
             return None;
         }
-        let own = self.channels.iter().find(|(request, _)| *request == frame.id()).map(|&(_, answer)| answer);
-        own.or_else(|| frame.id().sdo_request_node().map(CanId::sdo_response))
+        let channel = self.channels.iter().find(|(request, _)| *request == frame.id()).map(|&(_, answer)| answer);
+        channel.or_else(|| frame.id().sdo_request_node().map(CanId::sdo_response))
     }
 
-    /// Starts the measurement after many requests in a short time.
-    fn count(&mut self, now: Mono) -> Result<(), BusError> {
+    /// Counts a request, and starts the measurement after many requests in a short time.
+    fn count_request(&mut self, now: Mono) -> Result<(), BusError> {
         let (count, last) = self.requests;
-        let count = if now.since(last) > IDLE { 1 } else { count.saturating_add(1) };
+        let count = if now.since(last) > IDLE_TIMEOUT { 1 } else { count.saturating_add(1) };
         self.requests = (count, now);
-        if count < MANY || self.load.is_some() {
+        if count < MIN_REQUESTS || self.load.is_some() {
             return Ok(());
         }
         let bit_rate = self.bit_rate.get().unwrap_or_else(|| self.bus.bit_rate().filter(|rate| *rate > 0));
@@ -173,7 +173,7 @@ impl<B: Bus> Bus for Paced<B> {
         }
         self.bus.send(frame)?;
         self.answers.insert(answer);
-        self.count(now)?;
+        self.count_request(now)?;
         if let Some(load) = &mut self.load {
             load.on_frame(frame, now, self.limit.0);
             load.on_request(frame, now);
@@ -187,18 +187,18 @@ impl<B: Bus> Bus for Paced<B> {
             let (Some(load), Event::Frame(received)) = (&mut self.load, &event) else { return Ok(event) };
             let (frame, now) = (&received.frame, received.at.mono);
             load.on_frame(frame, now, self.limit.0);
-            // Boot-up messages come once, when the devices are switched on.
+            // Boot-up messages do not count as traffic: a device sends only one when it is switched on.
             let is_boot_up = frame.id().heartbeat_node().is_some() && frame.data() == [0];
             if !self.answers.contains(&frame.id()) && !is_boot_up {
                 load.on_traffic(frame, now);
             }
-            if now.since(self.requests.1) > IDLE {
+            if now.since(self.requests.1) > IDLE_TIMEOUT {
                 self.stop_measuring()?;
             }
             if self.filters.wants(frame) {
                 return Ok(event);
             }
-            // Frames that no listener wants do not extend the wait.
+            // A frame that does not match the filters must not extend the wait.
             if now >= deadline {
                 return Ok(Event::Timeout);
             }
@@ -234,7 +234,7 @@ mod tests {
     /// Sends one frame at an interval, and answers SDO requests.
     struct Sender {
         frame: &'static str,
-        every: Option<Duration>,
+        interval: Option<Duration>,
         next: Mono,
     }
 
@@ -253,23 +253,23 @@ mod tests {
 
         fn wake(&mut self, _: Mono, out: &mut Outbox) {
             out.send(self.frame.parse().expect("a frame"));
-            self.next = self.next + self.every.unwrap_or_default();
+            self.next = self.next + self.interval.unwrap_or_default();
         }
 
         fn next_wake(&self) -> Option<Mono> {
-            self.every.map(|_| self.next)
+            self.interval.map(|_| self.next)
         }
 
         fn sent(&mut self, _: Mono, _: &Frame) {}
     }
 
-    /// Reads as fast as possible for two seconds beside a sender. Returns the number of answers and the load of the
-    /// second second.
-    fn read(every: Option<Duration>, limit: Option<u8>) -> (u32, f64) {
-        read_beside(Sender { frame: TPDO, every, next: Mono::START }, limit)
+    /// Sends SDO requests as fast as possible for two seconds, while another station sends. Returns the number of
+    /// answers, and the load in the last second.
+    fn read(interval: Option<Duration>, limit: Option<u8>) -> (u32, f64) {
+        read_with_sender(Sender { frame: TPDO, interval, next: Mono::START }, limit)
     }
 
-    fn read_beside(sender: Sender, limit: Option<u8>) -> (u32, f64) {
+    fn read_with_sender(sender: Sender, limit: Option<u8>) -> (u32, f64) {
         let mut memory = MemoryBus::new(Clock::Virtual).with_bit_rate(BIT_RATE);
         memory.attach(sender);
         let request: Frame = "601#4000100000000000".parse().expect("a frame");
@@ -313,10 +313,10 @@ mod tests {
         // A heartbeat per second does not count as traffic.
         let (beside, _) = read(us(1_000_000), None);
         assert!(beside.abs_diff(free) <= 2, "{beside} and {free}");
-        // Boot-up messages are no traffic either. Frequent heartbeats are.
-        let (_, load) = read_beside(Sender { frame: "701#00", every: us(10_000), next: Mono::START }, None);
+        // Boot-up messages do not count as traffic either, but frequent heartbeats do.
+        let (_, load) = read_with_sender(Sender { frame: "701#00", interval: us(10_000), next: Mono::START }, None);
         assert!(load > 0.8, "{load}");
-        let (_, load) = read_beside(Sender { frame: "701#7F", every: us(10_000), next: Mono::START }, None);
+        let (_, load) = read_with_sender(Sender { frame: "701#7F", interval: us(10_000), next: Mono::START }, None);
         assert!((0.46..=0.505).contains(&load), "{load}");
         let (_, load) = read(None, Some(20));
         assert!((0.17..=0.205).contains(&load), "{load}");
@@ -332,11 +332,11 @@ mod tests {
     #[test]
     fn unwanted_frames_stay_away_and_do_not_extend_the_wait() {
         let mut memory = MemoryBus::new(Clock::Virtual).with_bit_rate(BIT_RATE);
-        memory.attach(Sender { frame: TPDO, every: us(700), next: Mono::START });
+        memory.attach(Sender { frame: TPDO, interval: us(700), next: Mono::START });
         let mut bus = Paced::new(memory, None, Vec::new());
         let answer = CanId::sdo_response("1".parse().expect("a node"));
         bus.listen(&Filters::Only(vec![answer])).expect("filters");
-        for _ in 0..2 * MANY {
+        for _ in 0..2 * MIN_REQUESTS {
             while bus.send(&"601#4000100000000000".parse().expect("a frame")).is_err() {
                 let until = bus.mono() + Duration::from_millis(1);
                 assert_eq!(bus.receive(until).expect("an event"), Event::Timeout);
@@ -349,7 +349,7 @@ mod tests {
         let until = bus.mono() + Duration::from_millis(50);
         assert_eq!(bus.receive(until).expect("an event"), Event::Timeout);
         assert!(bus.mono() < until + Duration::from_millis(1));
-        // The measurement ends with the requests.
+        // The measurement ends when no more requests are sent.
         let until = bus.mono() + Duration::from_secs(2);
         assert_eq!(bus.receive(until).expect("an event"), Event::Timeout);
         assert!(bus.load.is_none());

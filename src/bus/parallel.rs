@@ -12,21 +12,21 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-/// The highest bus load of all procedures together. The rest is for frames of low priority, such as heartbeats. With
-/// other traffic, [`Paced`](super::paced::Paced) has a lower limit.
-const OWN_LOAD: f64 = 0.9;
+/// The highest bus load of all procedures together. The rest is for frames of low priority, such as heartbeats. If
+/// other nodes send, [`Paced`](super::paced::Paced) applies a lower limit.
+const MAX_LOAD: f64 = 0.9;
 
-/// The frames in the transmit queue may together need this time on the bus.
-const QUEUED: Duration = Duration::from_millis(2);
+/// The most bus time that the frames in the transmit queue may need together.
+const MAX_QUEUED_TIME: Duration = Duration::from_millis(2);
 
-/// The wait before a frame is sent again that the bus did not accept.
+/// The wait before a rejected frame is sent again.
 const RETRY_INTERVAL: Duration = Duration::from_millis(1);
 
-/// How long a frame is sent again. Then the procedure gets the error.
+/// How long a rejected frame is sent again. After that, the procedure gets the error.
 const RETRY_LIMIT: Duration = Duration::from_secs(1);
 
 /// Runs `work` for all items at the same time; the results have the order of the items. A procedure cannot change the
-/// bit rate of the interface. A failure of the bus is an error for each procedure that waits.
+/// bit rate of the interface. Each error of the bus is returned to one waiting procedure.
 pub fn in_parallel<T: Send, R: Send>(
     bus: &mut dyn Bus,
     items: Vec<T>,
@@ -49,9 +49,9 @@ pub fn in_parallel<T: Send, R: Send>(
             };
             threads.push(scope.spawn(move || work(&mut procedure_bus, item)));
             let missed = VecDeque::new();
-            procedures.push(Procedure { calls: called, answers, filters: Filters::All, until: None, missed });
+            procedures.push(Procedure { calls: called, answers, filters: Filters::All, waits_until: None, missed });
         }
-        Dispatcher::new(bus, procedures).carry_out();
+        Dispatcher::new(bus, procedures).run();
         let results = threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
         results.collect()
     })
@@ -79,20 +79,20 @@ struct ProcedureBus {
     waits: bool,
     sends_remote_frames: bool,
     bit_rate: Option<u32>,
-    /// The last known moment.
+    /// The last known time. It is used if the thread with the real bus has ended.
     last: Cell<Stamp>,
     calls: Sender<Call>,
     answers: Receiver<Answer>,
 }
 
 impl ProcedureBus {
-    /// `None` if the thread with the real bus ended.
+    /// Returns `None` if the thread with the real bus has ended.
     fn call(&self, call: Call) -> Option<Answer> {
         self.calls.send(call).ok()?;
         self.answers.recv().ok()
     }
 
-    fn done(&self, call: Call) -> Result<(), BusError> {
+    fn perform(&self, call: Call) -> Result<(), BusError> {
         match self.call(call) {
             Some(Answer::Done(result)) => result,
             _ => Err(BusError::Down(self.name.clone())),
@@ -129,11 +129,11 @@ impl Bus for ProcedureBus {
     }
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.done(Call::Listen(filters.clone()))
+        self.perform(Call::Listen(filters.clone()))
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        self.done(Call::Send(*frame))
+        self.perform(Call::Send(*frame))
     }
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
@@ -150,13 +150,13 @@ impl BitRateControl for ProcedureBus {
     }
 }
 
-/// A procedure, for the thread with the real bus.
+/// A procedure, as the thread with the real bus sees it.
 struct Procedure {
     calls: Receiver<Call>,
     answers: Sender<Answer>,
     filters: Filters,
-    /// Until when it waits for an event; `None` if it waits to send, or ended.
-    until: Option<Mono>,
+    /// The deadline of the wait for an event; `None` if the procedure waits to send or has ended.
+    waits_until: Option<Mono>,
     /// Events that arrived while the procedure waited to send.
     missed: VecDeque<Event>,
 }
@@ -170,10 +170,10 @@ struct LoadLimiter {
 }
 
 impl LoadLimiter {
-    /// A frame was sent. Its answer is assumed to have the same length.
+    /// Counts a sent frame and its answer, which is assumed to have the same length.
     fn on_sent(&mut self, frame: &Frame, now: Mono) {
         let Some(bit_rate) = self.bit_rate else { return };
-        self.ready_at = self.ready_at.max(now - QUEUED) + (2 * frame_time(frame, bit_rate)).div_f64(OWN_LOAD);
+        self.ready_at = self.ready_at.max(now - MAX_QUEUED_TIME) + (2 * frame_time(frame, bit_rate)).div_f64(MAX_LOAD);
     }
 }
 
@@ -183,7 +183,7 @@ struct Dispatcher<'a> {
     procedures: Vec<Procedure>,
     /// The frames that wait to be sent, with their procedures.
     waiting: VecDeque<(usize, Frame)>,
-    /// Since when the bus accepts no frame.
+    /// The time since which the bus accepts no frames.
     full_since: Option<Mono>,
     limiter: LoadLimiter,
 }
@@ -201,34 +201,36 @@ impl Dispatcher<'_> {
     }
 
     /// Receives events for all procedures, until they have ended.
-    fn carry_out(&mut self) {
-        (0..self.procedures.len()).for_each(|at| self.serve(at));
+    fn run(&mut self) {
+        (0..self.procedures.len()).for_each(|index| self.serve(index));
         loop {
             self.send_waiting();
             let ready_at = self.waiting.front().map(|_| self.limiter.ready_at);
-            let untils = self.procedures.iter().filter_map(|procedure| procedure.until);
+            let untils = self.procedures.iter().filter_map(|procedure| procedure.waits_until);
             let Some(until) = untils.chain(ready_at).min() else { return };
             let event = self.bus.receive(until);
             self.deliver(event, until.max(self.bus.mono()));
         }
     }
 
-    /// Passes an event to the procedures that it concerns.
+    /// Passes an event to each procedure that waits for it, and keeps it for each procedure that waits to send.
     fn deliver(&mut self, event: Result<Event, BusError>, now: Mono) {
         let Ok(event) = event else {
             // Only one procedure gets this error. The next error goes to the next waiting procedure.
-            let Some(at) = self.procedures.iter().position(|procedure| procedure.until.is_some()) else { return };
-            return self.answer(at, Answer::Event(event));
+            let Some(index) = self.procedures.iter().position(|procedure| procedure.waits_until.is_some()) else {
+                return;
+            };
+            return self.answer(index, Answer::Event(event));
         };
-        for at in 0..self.procedures.len() {
-            let procedure = &mut self.procedures[at];
+        for index in 0..self.procedures.len() {
+            let procedure = &mut self.procedures[index];
             let concerns = match event {
                 Event::Frame(received) => procedure.filters.wants(&received.frame),
-                Event::Timeout => procedure.until.is_some_and(|until| until <= now),
+                Event::Timeout => procedure.waits_until.is_some_and(|until| until <= now),
                 _ => true,
             };
-            match procedure.until {
-                Some(_) if concerns => self.answer(at, Answer::Event(Ok(event))),
+            match procedure.waits_until {
+                Some(_) if concerns => self.answer(index, Answer::Event(Ok(event))),
                 None if concerns && event != Event::Timeout => procedure.missed.push_back(event),
                 _ => {}
             }
@@ -238,14 +240,14 @@ impl Dispatcher<'_> {
     /// Sends the waiting frames in their order, as far as the bus load allows it.
     fn send_waiting(&mut self) {
         while self.limiter.ready_at <= self.bus.mono()
-            && let Some((at, frame)) = self.waiting.pop_front()
+            && let Some((index, frame)) = self.waiting.pop_front()
         {
             let result = self.bus.send(&frame);
             let now = self.bus.mono();
             if matches!(result, Err(BusError::QueueFull)) {
                 let since = *self.full_since.get_or_insert(now);
                 if now.since(since) < RETRY_LIMIT {
-                    self.waiting.push_front((at, frame));
+                    self.waiting.push_front((index, frame));
                     self.limiter.ready_at = now + RETRY_INTERVAL;
                     return;
                 }
@@ -254,33 +256,33 @@ impl Dispatcher<'_> {
             if result.is_ok() {
                 self.limiter.on_sent(&frame, now);
             }
-            self.answer(at, Answer::Done(result));
+            self.answer(index, Answer::Done(result));
         }
     }
 
     /// Answers a call of a procedure, and carries out its next calls.
-    fn answer(&mut self, at: usize, answer: Answer) {
+    fn answer(&mut self, index: usize, answer: Answer) {
         // If the procedure has ended, this fails, and `serve` sees the end.
-        let _ = self.procedures[at].answers.send(answer);
-        self.serve(at);
+        let _ = self.procedures[index].answers.send(answer);
+        self.serve(index);
     }
 
     /// Carries out the calls of one procedure until it waits or ends.
-    fn serve(&mut self, at: usize) {
-        self.procedures[at].until = None;
+    fn serve(&mut self, index: usize) {
+        self.procedures[index].waits_until = None;
         loop {
-            let procedure = &mut self.procedures[at];
+            let procedure = &mut self.procedures[index];
             let answer = match procedure.calls.recv() {
                 Ok(Call::Receive(until)) => match procedure.missed.pop_front() {
                     Some(event) => Answer::Event(Ok(event)),
                     None => {
-                        procedure.until = Some(until);
+                        procedure.waits_until = Some(until);
                         return;
                     }
                 },
                 Ok(Call::Now) => Answer::Now(self.bus.now()),
                 Ok(Call::Send(frame)) => {
-                    self.waiting.push_back((at, frame));
+                    self.waiting.push_back((index, frame));
                     return;
                 }
                 Ok(Call::Listen(filters)) => {
@@ -294,7 +296,7 @@ impl Dispatcher<'_> {
                 }
             };
             // If the procedure has ended, this fails, and the next `recv` reports the end.
-            let _ = self.procedures[at].answers.send(answer);
+            let _ = self.procedures[index].answers.send(answer);
         }
     }
 }

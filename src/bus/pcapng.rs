@@ -1,29 +1,29 @@
-//! Frames as a capture file for Wireshark (pcapng, link type SocketCAN).
+//! Formats frames as a capture file for Wireshark (pcapng, link type SocketCAN).
 
 use super::Wall;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 
-/// Link type of frames of SocketCAN.
+/// The link type of SocketCAN frames.
 const LINKTYPE_CAN_SOCKETCAN: u16 = 227;
 
-/// Types of blocks.
+/// The block types.
 const SECTION_HEADER: u32 = 0x0a0d_0d0a;
 const INTERFACE_DESCRIPTION: u32 = 1;
 const ENHANCED_PACKET: u32 = 6;
 
-/// Options of an interface: its name, and the resolution of times as a negative power of ten.
+/// Options of an interface block: the name, and the time resolution as a negative power of ten.
 const IF_NAME: u16 = 2;
 const IF_TSRESOL: u16 = 9;
 
-/// The option of a packet with its direction.
+/// The option of a packet block that contains the direction.
 const EPB_FLAGS: u16 = 2;
 
-/// Flags of SocketCAN in an identifier.
+/// The flags that SocketCAN adds to an identifier.
 const EXTENDED: u32 = 0x8000_0000;
 const REMOTE: u32 = 0x4000_0000;
 
-/// The start of a file with the frames of one interface.
+/// Returns the blocks at the start of a file with the frames of one interface.
 pub(super) fn header(interface: &str) -> Vec<u8> {
     let mut section = 0x1a2b_3c4d_u32.to_le_bytes().to_vec();
     // Version 1.0; the length of the section is unknown.
@@ -38,7 +38,7 @@ pub(super) fn header(interface: &str) -> Vec<u8> {
     [block(SECTION_HEADER, &section), block(INTERFACE_DESCRIPTION, &description)].concat()
 }
 
-/// A frame; `is_sent` if this program sent it.
+/// Returns the block of a frame. `is_sent`: this program sent the frame.
 pub(super) fn packet(wall: Wall, frame: &Frame, is_sent: bool) -> Vec<u8> {
     let flags = if let CanId::Extended(_) = frame.id() { EXTENDED } else { 0 };
     let flags = if frame.is_remote() { flags | REMOTE } else { flags };

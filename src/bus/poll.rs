@@ -45,7 +45,7 @@ fn wait(set: &mut [libc::pollfd], limit: Duration) -> libc::c_int {
         // Below 10^9, so it fits into each width of c_long.
         tv_nsec: limit.subsec_nanos() as libc::c_long,
     };
-    // SAFETY: `set` and `limit` outlive the call, the count is that of `set`, and the descriptors
+    // SAFETY: `set` and `limit` outlive the call, the count is the length of `set`, and the descriptors
     // are borrowed by the caller and so are open.
     unsafe { libc::ppoll(set.as_mut_ptr(), count(set), &raw const limit, std::ptr::null()) }
 }
@@ -56,7 +56,7 @@ fn wait(set: &mut [libc::pollfd], limit: Duration) -> libc::c_int {
     // Rounded up: a wait that ends too early would make the caller's loop busy.
     let millis = limit.as_nanos().div_ceil(1_000_000);
     let millis = libc::c_int::try_from(millis).unwrap_or(libc::c_int::MAX);
-    // SAFETY: `set` outlives the call, the count is its own, and the descriptors are borrowed by the
+    // SAFETY: `set` outlives the call, the count is its length, and the descriptors are borrowed by the
     // caller and so are open.
     unsafe { libc::poll(set.as_mut_ptr(), count(set), millis) }
 }

@@ -9,7 +9,7 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The place of a byte stream.
+/// The address of a byte stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     /// A serial port and its speed in bit/s.
@@ -109,7 +109,7 @@ pub struct SerialAdapter {
     pub product: Option<String>,
 }
 
-/// The serial ports of USB adapters, sorted.
+/// Lists the serial ports of USB adapters, sorted.
 pub fn adapters() -> Vec<SerialAdapter> {
     let ports = SerialPort::available_ports().unwrap_or_default();
     let mut found: Vec<SerialAdapter> =
@@ -118,14 +118,14 @@ pub fn adapters() -> Vec<SerialAdapter> {
     found
 }
 
-/// The adapter at a port; `None` for a port of the computer itself, such as `ttyS0`, and for a pseudo-terminal (`ttya0`).
+/// Returns the adapter at a port; `None` for a built-in port (`ttyS0`) and for a pseudo-terminal (`ttya0`).
 fn adapter(path: &Path, sysfs: &Path) -> Option<SerialAdapter> {
     let name = path.file_name()?.to_str()?;
     let is_pseudo = matches!(name.as_bytes(), [b't', b't', b'y', b'a'..=b'z', b'0'..=b'9' | b'a'..=b'f']);
     if name.starts_with("ttyS") || name.starts_with("ttyAMA") || is_pseudo {
         return None;
     }
-    // The product name is one level above the device of ttyACM0, and two levels above that of ttyUSB0.
+    // The file `product` is one level above the device folder of ttyACM0, and two levels above it for ttyUSB0.
     let product = ["../product", "../../product"].into_iter().find_map(|up| {
         let text = std::fs::read_to_string(sysfs.join(name).join("device").canonicalize().ok()?.join(up)).ok()?;
         Some(super::stream::printable(text.trim()))
@@ -135,7 +135,7 @@ fn adapter(path: &Path, sysfs: &Path) -> Option<SerialAdapter> {
 
 fn is_pending(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
-    // The connection has started.
+    // The connection is not complete yet.
     #[cfg(unix)]
     if error.raw_os_error() == Some(libc::EINPROGRESS) {
         return true;
@@ -148,7 +148,7 @@ fn is_pending(error: &io::Error) -> bool {
     }
 }
 
-/// The addresses of a host.
+/// Looks up the addresses of a host.
 pub(super) fn resolve(host: &str, port: u16) -> io::Result<Vec<SocketAddr>> {
     Ok((host, port).to_socket_addrs()?.collect())
 }
@@ -166,14 +166,14 @@ impl std::os::fd::AsFd for Port {
 #[cfg(unix)]
 pub(super) use std::os::fd::AsFd as Waitable;
 
-/// A placeholder, because other systems do not wait for a descriptor.
+/// A placeholder for systems on which [`wait`] does not use descriptors.
 #[cfg(not(unix))]
 pub(super) trait Waitable {}
 #[cfg(not(unix))]
 impl<T> Waitable for T {}
 
-/// Waits until one of the sources can be read, or written if its flag is set, until a signal arrives, or until `limit`
-/// has passed. Returns which sources are ready.
+/// Waits until a source is readable (or writable, if its flag is set), a signal arrives, or `limit` has passed. Returns
+/// which sources are ready.
 #[cfg(unix)]
 pub(super) fn wait(
     sources: &[(&dyn Waitable, bool)],
@@ -190,7 +190,7 @@ pub(super) fn wait(
     Ok(ready)
 }
 
-/// Like the variant for Unix, but in short steps, because other systems cannot wait for both.
+/// Sleeps for at most 1 ms and returns all sources as ready, because this system cannot wait for sources and signals.
 #[cfg(not(unix))]
 pub(super) fn wait(sources: &[(&dyn Waitable, bool)], _: &mut Interrupts, limit: Duration) -> io::Result<Vec<bool>> {
     std::thread::sleep(limit.min(Duration::from_millis(1)));

@@ -1,4 +1,4 @@
-//! Parses the names of buses behind a byte stream, and opens their transports.
+//! Parses the names of remote buses, which are reached over a byte stream, and opens them.
 
 use super::port::Place;
 pub use super::port::{SerialAdapter, adapters};
@@ -9,9 +9,9 @@ use super::{Bus, BusError, Mode};
 use crate::canopen::id::bit_rate;
 use std::fmt;
 
-/// The TCP port of socketcand.
+/// The default TCP port of socketcand.
 pub const SOCKETCAND_PORT: u16 = 29536;
-/// The speed of a serial port, in bit/s. Adapters with USB ignore it.
+/// The default speed of a serial port, in bit/s. Adapters with USB ignore it.
 const SERIAL_SPEED: u32 = 115_200;
 
 /// A bus behind a byte stream: `socketcand://HOST[:PORT]/BUS`, `slcan:DEVICE@RATE`, `slcan:tcp://HOST:PORT@RATE`.
@@ -24,7 +24,7 @@ pub struct Remote {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Transport {
-    /// The name of the bus at the server.
+    /// The name of the bus on the server.
     Socketcand(String),
     /// The bit rate in bit/s.
     Slcan(u32),
@@ -45,10 +45,11 @@ impl Remote {
     /// Parses the name of a bus; `None` for other kinds of buses.
     ///
     /// # Errors
-    /// A mistake in the name.
+    /// The name is invalid. The text describes the mistake.
     pub fn parse(text: &str) -> Option<Result<Remote, String>> {
         if let Some(rest) = text.strip_prefix("socketcand://") {
-            let parsed = socketcand(rest).ok_or_else(|| format!("\"{text}\" is not socketcand://HOST[:PORT]/BUS"));
+            let parsed =
+                parse_socketcand(rest).ok_or_else(|| format!("\"{text}\" is not socketcand://HOST[:PORT]/BUS"));
             return Some(parsed.map(|(place, bus)| Remote {
                 name: text.to_owned(),
                 place,
@@ -56,7 +57,7 @@ impl Remote {
             }));
         }
         let rest = text.strip_prefix("slcan:")?;
-        Some(slcan(rest).map(|(place, bit_rate)| Remote {
+        Some(parse_slcan(rest).map(|(place, bit_rate)| Remote {
             name: text.to_owned(),
             place,
             transport: Transport::Slcan(bit_rate),
@@ -88,17 +89,17 @@ impl fmt::Display for Remote {
     }
 }
 
-/// `HOST[:PORT]/BUS`.
-fn socketcand(text: &str) -> Option<(Place, String)> {
+/// Parses `HOST[:PORT]/BUS`.
+fn parse_socketcand(text: &str) -> Option<(Place, String)> {
     let (host, bus) = text.split_once('/')?;
     let is_word =
         |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic() && !b"<>/".contains(&byte));
-    let place = tcp(host, Some(SOCKETCAND_PORT))?;
+    let place = parse_tcp(host, Some(SOCKETCAND_PORT))?;
     is_word(bus).then(|| (place, bus.to_owned()))
 }
 
-/// `HOST:PORT`, `[::1]:PORT`.
-fn tcp(text: &str, default_port: Option<u16>) -> Option<Place> {
+/// Parses `HOST:PORT` and `[::1]:PORT`.
+fn parse_tcp(text: &str, default_port: Option<u16>) -> Option<Place> {
     let (host, port) = match text.strip_prefix('[') {
         Some(rest) => {
             let (host, port) = rest.split_once(']')?;
@@ -114,8 +115,8 @@ fn tcp(text: &str, default_port: Option<u16>) -> Option<Place> {
     Some(Place::Tcp(host.to_owned(), port?))
 }
 
-/// `DEVICE@RATE[,serial=SPEED]`, `tcp://HOST:PORT@RATE`.
-fn slcan(text: &str) -> Result<(Place, u32), String> {
+/// Parses `DEVICE@RATE[,serial=SPEED]` and `tcp://HOST:PORT@RATE`.
+fn parse_slcan(text: &str) -> Result<(Place, u32), String> {
     let (text, speed) = match text.rsplit_once(",serial=") {
         Some((text, speed)) => (text, Some(speed)),
         None => (text, None),
@@ -128,7 +129,7 @@ fn slcan(text: &str) -> Result<(Place, u32), String> {
     let rate = bit_rate(rate)?;
     let place = match device.strip_prefix("tcp://") {
         Some(host) if speed.is_none() => {
-            tcp(host, None).ok_or_else(|| format!("\"slcan:{text}\" is not slcan:tcp://HOST:PORT@RATE"))?
+            parse_tcp(host, None).ok_or_else(|| format!("\"slcan:{text}\" is not slcan:tcp://HOST:PORT@RATE"))?
         }
         Some(_) => return Err(format!("\"slcan:{text}\": serial= is for a serial port, not for TCP")),
         None => {

@@ -5,14 +5,14 @@ use crate::canopen::frame::Frame;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// When the scripted bus was opened.
+/// The wall time at which the scripted bus was opened.
 const OPENED: Duration = Duration::from_secs(1_436_509_052);
 
 /// Events to deliver, in order of time, and the frames that were sent.
 #[derive(Default)]
 pub(super) struct Script {
     now: Mono,
-    coming: VecDeque<(Mono, Event)>,
+    pending: VecDeque<(Mono, Event)>,
     pub(super) sent: Vec<String>,
 }
 
@@ -24,7 +24,7 @@ impl Script {
     /// Delivers this frame at `at`.
     pub(super) fn frame(mut self, at: Mono, text: &str) -> Script {
         let frame = text.parse().unwrap();
-        self.coming.push_back((at, Event::Frame(Received { frame, at: stamp(at) })));
+        self.pending.push_back((at, Event::Frame(Received { frame, at: stamp(at) })));
         self
     }
 }
@@ -58,10 +58,10 @@ impl Bus for Script {
     }
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
-        match self.coming.front() {
+        match self.pending.front() {
             Some((at, _)) if *at <= deadline => {
                 self.now = self.now.max(*at);
-                Ok(self.coming.pop_front().unwrap().1)
+                Ok(self.pending.pop_front().unwrap().1)
             }
             _ => {
                 self.now = self.now.max(deadline);

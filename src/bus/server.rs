@@ -1,4 +1,4 @@
-//! A socketcand server as a bus. Its clients are the other participants. Each client receives the frames of this
+//! A bus that is a socketcand server. The clients are the other participants. Each client receives the frames of this
 //! program and of the other clients.
 
 use super::interrupt::Interrupts;
@@ -13,8 +13,8 @@ use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-/// A client with more unread bytes is disconnected.
-const MAX_WAITING: usize = 256 * 1024;
+/// A client with more unread bytes than this is disconnected.
+const MAX_UNREAD_BYTES: usize = 256 * 1024;
 /// The largest number of clients.
 const MAX_CLIENTS: usize = 64;
 
@@ -66,26 +66,26 @@ struct Client {
     messages: Messages,
     has_opened: bool,
     is_raw: bool,
-    waiting: Vec<u8>,
-    is_gone: bool,
+    unsent: Vec<u8>,
+    is_closed: bool,
 }
 
 impl Client {
-    fn say(&mut self, message: &str) {
-        self.waiting.extend(message.bytes());
+    fn send_text(&mut self, message: &str) {
+        self.unsent.extend(message.bytes());
         self.flush();
     }
 
     fn flush(&mut self) {
-        while !self.waiting.is_empty() && !self.is_gone {
-            match self.stream.write(&self.waiting) {
-                Ok(count @ 1..) => drop(self.waiting.drain(..count)),
+        while !self.unsent.is_empty() && !self.is_closed {
+            match self.stream.write(&self.unsent) {
+                Ok(count @ 1..) => drop(self.unsent.drain(..count)),
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Ok(_) | Err(_) => self.is_gone = true,
+                Ok(_) | Err(_) => self.is_closed = true,
             }
         }
-        self.is_gone |= self.waiting.len() > MAX_WAITING;
+        self.is_closed |= self.unsent.len() > MAX_UNREAD_BYTES;
     }
 
     /// Reads from the client. Returns the received frames.
@@ -93,12 +93,12 @@ impl Client {
         let mut buffer = [0; 4096];
         let count = match self.stream.read(&mut buffer) {
             Ok(0) => {
-                self.is_gone = true;
+                self.is_closed = true;
                 0
             }
             Ok(count) => count,
             Err(error) => {
-                self.is_gone |= !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted);
+                self.is_closed |= !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted);
                 0
             }
         };
@@ -115,18 +115,18 @@ impl Client {
         match words.next().unwrap_or_default() {
             "open" if words.next().is_some() => {
                 self.has_opened = true;
-                self.say("< ok >");
+                self.send_text("< ok >");
             }
             "rawmode" if self.has_opened => {
                 self.is_raw = true;
-                self.say("< ok >");
+                self.send_text("< ok >");
             }
             "send" if self.is_raw => match sent_frame(words) {
                 Some(frame) => return Some(frame),
-                None => self.say("< error invalid frame >"),
+                None => self.send_text("< error invalid frame >"),
             },
-            "echo" => self.say("< echo >"),
-            _ => self.say("< error unknown command >"),
+            "echo" => self.send_text("< echo >"),
+            _ => self.send_text("< error unknown command >"),
         }
         None
     }
@@ -155,7 +155,7 @@ impl Server {
     /// The address, with the port chosen by the system.
     ///
     /// # Errors
-    /// Those of the system.
+    /// The system cannot report the address.
     pub fn address(&self) -> io::Result<Address> {
         self.listener.local_addr().map(Address)
     }
@@ -172,10 +172,10 @@ impl Server {
                 messages: Messages::default(),
                 has_opened: false,
                 is_raw: false,
-                waiting: Vec::new(),
-                is_gone: false,
+                unsent: Vec::new(),
+                is_closed: false,
             };
-            client.say("< hi >");
+            client.send_text("< hi >");
             self.clients.push(client);
         }
     }
@@ -189,14 +189,14 @@ impl Server {
         let message = frame_message(frame, self.now());
         for (index, client) in self.clients.iter_mut().enumerate() {
             if client.is_raw && sender != Some(index) {
-                client.say(&message);
+                client.send_text(&message);
             }
         }
     }
 
-    fn work(&mut self, limit: Duration) -> Result<(), BusError> {
+    fn serve_clients(&mut self, limit: Duration) -> Result<(), BusError> {
         let listener: (&dyn Waitable, bool) = (&self.listener, false);
-        let clients = self.clients.iter().map(|it| (&it.stream as &dyn Waitable, !it.waiting.is_empty()));
+        let clients = self.clients.iter().map(|it| (&it.stream as &dyn Waitable, !it.unsent.is_empty()));
         let sources: Vec<_> = [listener].into_iter().chain(clients).collect();
         let ready = wait(&sources, &mut self.interrupts, limit)
             .map_err(|source| BusError::Io { what: format!("wait for {}", self.name), source })?;
@@ -210,7 +210,7 @@ impl Server {
                 }
             }
         }
-        self.clients.retain(|client| !client.is_gone);
+        self.clients.retain(|client| !client.is_closed);
         self.accept();
         Ok(())
     }
@@ -254,7 +254,7 @@ impl Bus for Server {
                 return Ok(event);
             }
             let left = deadline.since(self.mono());
-            self.work(left)?;
+            self.serve_clients(left)?;
             if left.is_zero() && self.ready.is_empty() {
                 return Ok(Event::Timeout);
             }

@@ -18,10 +18,10 @@ const MAX_MESSAGE: usize = 256;
 /// The number of bytes of an unknown greeting that are shown.
 const MAX_GREETING: usize = 40;
 
-/// Finds messages in a stream of bytes that arrive in pieces.
+/// Splits a byte stream into messages. The bytes may arrive in pieces.
 #[derive(Debug, Default)]
 pub(super) struct Messages {
-    /// The message so far; `None` outside of one.
+    /// The bytes of an unfinished message; `None` between messages.
     text: Option<Vec<u8>>,
     /// The first bytes outside of messages.
     noise: Vec<u8>,
@@ -62,9 +62,9 @@ impl Messages {
     }
 }
 
-/// The identifier of a message: three digits, or eight digits for 29 bits.
-fn identifier(text: &str) -> Option<CanId> {
-    let number = hexadecimal(text)?;
+/// Parses an identifier: three digits, or eight digits for 29 bits.
+fn parse_identifier(text: &str) -> Option<CanId> {
+    let number = parse_hexadecimal(text)?;
     match text.len() {
         3 => CanId::standard(u16::try_from(number).ok()?),
         8 => CanId::extended(number),
@@ -72,14 +72,14 @@ fn identifier(text: &str) -> Option<CanId> {
     }
 }
 
-/// `u32::from_str_radix` accepts a sign.
-fn hexadecimal(text: &str) -> Option<u32> {
+/// Parses hexadecimal digits. Rejects a sign, which `u32::from_str_radix` accepts.
+fn parse_hexadecimal(text: &str) -> Option<u32> {
     let digits = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_hexdigit());
     u32::from_str_radix(text, 16).ok().filter(|_| digits)
 }
 
-/// `1436509052.249713`.
-fn time(text: &str) -> Option<Duration> {
+/// Parses a time: `1436509052.249713`.
+fn parse_time(text: &str) -> Option<Duration> {
     let (seconds, micros) = text.split_once('.')?;
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     if !digits(seconds) || !digits(micros) || micros.len() > 6 {
@@ -89,50 +89,50 @@ fn time(text: &str) -> Option<Duration> {
     Some(Duration::new(seconds.parse().ok()?, micros.parse::<u32>().ok()? * scale * 1000))
 }
 
-/// The frame of `frame ID TIME DATA`, and its time.
-fn frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<(Frame, Duration)> {
-    let (id, at) = (identifier(words.next()?)?, time(words.next()?)?);
+/// Parses `ID TIME DATA`, the words after `frame` in a message of the server.
+fn parse_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<(Frame, Duration)> {
+    let (id, at) = (parse_identifier(words.next()?)?, parse_time(words.next()?)?);
     let words: Vec<&str> = words.collect();
     let mut data = Vec::with_capacity(8);
     match words.as_slice() {
         [] => {}
         [text] if text.len() % 2 == 0 && text.len() <= 16 && text.is_ascii() => {
             for place in (0..text.len()).step_by(2) {
-                data.push(u8::try_from(hexadecimal(&text[place..place + 2])?).ok()?);
+                data.push(u8::try_from(parse_hexadecimal(&text[place..place + 2])?).ok()?);
             }
         }
-        // One word for each byte, as in the document of the protocol.
-        words => data.extend(bytes(words)?),
+        // One word for each byte, as in the protocol document.
+        words => data.extend(parse_bytes(words)?),
     }
     Some((Frame::new(id, &data).ok()?, at))
 }
 
-fn bytes(words: &[&str]) -> Option<Vec<u8>> {
-    words.iter().map(|word| hexadecimal(word).and_then(|number| u8::try_from(number).ok())).collect()
+fn parse_bytes(words: &[&str]) -> Option<Vec<u8>> {
+    words.iter().map(|word| parse_hexadecimal(word).and_then(|number| u8::try_from(number).ok())).collect()
 }
 
-/// The frame of `send ID LENGTH BYTES` from a client.
+/// Parses `ID LENGTH BYTES`, the words after `send` in a message of a client.
 pub(super) fn sent_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Frame> {
-    let (id, length) = (identifier(words.next()?)?, hexadecimal(words.next()?)?);
-    let data = bytes(&words.collect::<Vec<_>>())?;
+    let (id, length) = (parse_identifier(words.next()?)?, parse_hexadecimal(words.next()?)?);
+    let data = parse_bytes(&words.collect::<Vec<_>>())?;
     (u32::try_from(data.len()) == Ok(length)).then(|| Frame::new(id, &data).ok()).flatten()
 }
 
-/// The message of a server with a frame.
+/// Returns the message with which a server delivers a frame.
 pub(super) fn frame_message(frame: &Frame, at: Stamp) -> String {
     let at = at.wall.since_epoch();
     let data: String = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
     format!("< frame {} {}.{:06} {data} >", frame.id(), at.as_secs(), at.subsec_micros())
 }
 
-/// The frame of a message of a server.
+/// Parses a message with which a server delivers a frame.
 pub(super) fn received_frame(message: &str) -> Option<Frame> {
     let mut words = message.split_ascii_whitespace();
     words.next().filter(|word| *word == "frame")?;
-    Some(frame(words)?.0)
+    Some(parse_frame(words)?.0)
 }
 
-/// The message of a client that sends a frame.
+/// Returns the message with which a client sends a frame.
 pub(super) fn send_message(frame: &Frame) -> Result<String, BusError> {
     if frame.is_remote() {
         return Err(BusError::NoRemoteFrames);
@@ -141,7 +141,7 @@ pub(super) fn send_message(frame: &Frame) -> Result<String, BusError> {
     Ok(format!("< send {} {} {data}>", frame.id(), frame.len()))
 }
 
-/// The classes of an error frame (linux/can/error.h). The protocol has no details.
+/// Returns the faults for the classes of an error frame (linux/can/error.h). The protocol has no details.
 fn faults(classes: u32) -> impl Iterator<Item = Fault> {
     const CLASSES: [(u32, Fault); 7] = [
         (0x001, Fault::TransmitTimeout),
@@ -169,10 +169,10 @@ enum Stage {
 /// A client in raw mode.
 #[derive(Debug)]
 pub(super) struct Client {
-    /// The name of the bus at the server.
+    /// The name of the bus on the server.
     bus: String,
     stage: Stage,
-    until: Mono,
+    deadline: Mono,
     messages: Messages,
     clock: OwnClock,
 }
@@ -182,7 +182,7 @@ impl Client {
         Client {
             bus: bus.to_owned(),
             stage: Stage::Greeting,
-            until: Mono::START,
+            deadline: Mono::START,
             messages: Messages::default(),
             clock: OwnClock::default(),
         }
@@ -194,20 +194,22 @@ impl Client {
             ("hi", Stage::Greeting) => self.ask(Stage::Opening, &format!("< open {} >", self.bus), now, out),
             ("ok", Stage::Opening) => self.ask(Stage::Switching, "< rawmode >", now, out),
             ("ok", Stage::Switching) => self.stage = Stage::Open,
-            ("frame", Stage::Open) => match frame(words) {
+            ("frame", Stage::Open) => match parse_frame(words) {
                 Some((frame, own)) => {
                     let at = self.clock.place(own, now);
                     out.events.push_back(Event::Frame(Received { frame, at }));
                 }
                 None => out.events.push_back(Event::Fault(Fault::Garbled, now)),
             },
-            ("error", Stage::Open) => match (words.next().and_then(hexadecimal), words.next().and_then(time)) {
-                (Some(classes), Some(own)) => {
-                    let at = self.clock.place(own, now);
-                    out.events.extend(faults(classes).map(|fault| Event::Fault(fault, at)));
+            ("error", Stage::Open) => {
+                match (words.next().and_then(parse_hexadecimal), words.next().and_then(parse_time)) {
+                    (Some(classes), Some(own)) => {
+                        let at = self.clock.place(own, now);
+                        out.events.extend(faults(classes).map(|fault| Event::Fault(fault, at)));
+                    }
+                    _ => out.events.push_back(Event::Fault(Fault::Other, now)),
                 }
-                _ => out.events.push_back(Event::Fault(Fault::Other, now)),
-            },
+            }
             ("error", stage) => {
                 let why = super::stream::printable(message.trim_start_matches("error").trim());
                 return Err(match stage {
@@ -215,7 +217,7 @@ impl Client {
                     _ => format!("the server refuses the bus \"{}\": {why}", self.bus),
                 });
             }
-            // Other messages of the server, for example statistics.
+            // Other messages of the server, for example statistics, are ignored.
             _ => {}
         }
         Ok(())
@@ -223,14 +225,14 @@ impl Client {
 
     fn ask(&mut self, stage: Stage, message: &str, now: Stamp, out: &mut Output) {
         self.stage = stage;
-        self.until = now.mono + OPEN_TIMEOUT;
+        self.deadline = now.mono + OPEN_TIMEOUT;
         out.bytes.extend(message.bytes());
     }
 }
 
 impl Protocol for Client {
     fn start(&mut self, now: Stamp, _: &mut Output) {
-        *self = Client { until: now.mono + OPEN_TIMEOUT, ..Client::new(&self.bus) };
+        *self = Client { deadline: now.mono + OPEN_TIMEOUT, ..Client::new(&self.bus) };
     }
 
     fn receive(&mut self, bytes: &[u8], now: Stamp, out: &mut Output) -> Result<(), String> {
@@ -250,7 +252,7 @@ impl Protocol for Client {
     }
 
     fn next_wake(&self) -> Option<Mono> {
-        (self.stage != Stage::Open).then_some(self.until)
+        (self.stage != Stage::Open).then_some(self.deadline)
     }
 
     fn wake(&mut self, _: Stamp, _: &mut Output) -> Result<(), String> {

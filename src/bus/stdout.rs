@@ -13,19 +13,19 @@ static IS_CLOSED: AtomicBool = AtomicBool::new(false);
 #[used]
 #[expect(unsafe_code, reason = "std has no function that runs before it opens the closed descriptors")]
 #[unsafe(link_section = ".init_array")]
-static LOOK: extern "C" fn() = {
-    extern "C" fn look() {
+static CHECK_STDOUT: extern "C" fn() = {
+    extern "C" fn check_stdout() {
         // SAFETY: F_GETFD only reads, and any descriptor is allowed.
         let flags = unsafe { libc::fcntl(libc::STDOUT_FILENO, libc::F_GETFD) };
         IS_CLOSED.store(flags == -1, Ordering::Relaxed);
     }
-    look
+    check_stdout
 };
 
-/// stdout.
+/// Returns stdout.
 ///
 /// # Errors
-/// stdout was closed when the program started. The kind of the error differs from that of a closed pipe.
+/// stdout was closed when the program started. The error kind differs from `BrokenPipe`, the kind for a closed pipe.
 pub fn stdout() -> io::Result<io::Stdout> {
     if IS_CLOSED.load(Ordering::Relaxed) { Err(io::Error::other("it is closed")) } else { Ok(io::stdout()) }
 }

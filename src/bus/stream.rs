@@ -1,4 +1,4 @@
-//! A bus behind a byte stream: an adapter at a serial port, or a server on the network. A [`Protocol`] handles the text
+//! A bus over a byte stream: an adapter at a serial port, or a server on the network. A [`Protocol`] handles the text
 //! on the stream. This module connects, waits and reconnects.
 
 use super::interrupt::Interrupts;
@@ -12,14 +12,14 @@ use std::time::{Duration, Instant};
 
 /// The longest wait for a TCP connection to one address.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
-/// The interval of attempts to reconnect.
+/// The interval between attempts to reconnect.
 const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 /// The limit of unsent bytes. With more bytes, the transmit queue is full.
-const MAX_WAITING: usize = 16 * 1024;
+const MAX_UNSENT_BYTES: usize = 16 * 1024;
 /// The longest wait for the last bytes when the bus is closed.
 const CLOSE_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// The output of a protocol for the other side, and for the program.
+/// The output of a protocol: bytes for the other side, and events for the program.
 #[derive(Debug, Default)]
 pub(super) struct Output {
     pub(super) bytes: Vec<u8>,
@@ -28,7 +28,7 @@ pub(super) struct Output {
 
 /// The protocol of an adapter or server, as a state machine without I/O and clock.
 ///
-/// An error is the reason why the connection cannot be used.
+/// The text of an error is the reason why the connection cannot be used.
 pub(super) trait Protocol {
     /// Starts on a new connection.
     fn start(&mut self, now: Stamp, out: &mut Output);
@@ -36,19 +36,19 @@ pub(super) trait Protocol {
     /// Processes received bytes, which arrive in pieces.
     fn receive(&mut self, bytes: &[u8], now: Stamp, out: &mut Output) -> Result<(), String>;
 
-    /// When [`Protocol::wake`] must be called.
+    /// Returns when [`Protocol::wake`] must be called.
     fn next_wake(&self) -> Option<Mono>;
 
-    /// The moment of [`Protocol::next_wake`] was reached.
+    /// Does what is due at `now`, the moment of [`Protocol::next_wake`].
     fn wake(&mut self, now: Stamp, out: &mut Output) -> Result<(), String>;
 
-    /// Accepts a frame.
+    /// Accepts a frame to send.
     fn send(&mut self, frame: &Frame, now: Stamp, out: &mut Output) -> Result<(), BusError>;
 
     /// Whether frames can be sent and received.
     fn is_open(&self) -> bool;
 
-    /// Whether accepted frames still wait for `out`.
+    /// Whether accepted frames are not yet written to `out`.
     fn is_busy(&self) -> bool {
         false
     }
@@ -82,7 +82,7 @@ pub(super) trait Protocol {
         None
     }
 
-    /// Why the last [`Protocol::set_channel`] was rejected by the other side.
+    /// Returns once why the other side rejected the last [`Protocol::set_channel`].
     fn take_refusal(&mut self) -> Option<String> {
         None
     }
@@ -90,14 +90,14 @@ pub(super) trait Protocol {
 
 /// The connection.
 enum Link {
-    /// No connection until the next attempt.
+    /// Not connected. The next attempt is at this moment.
     Down(Mono),
     /// The connection is in progress, at most until this moment.
     Connecting(Port, Mono),
     Up(Port),
 }
 
-/// A bus behind a byte stream.
+/// A bus over a byte stream.
 pub(super) struct StreamBus<P: Protocol> {
     name: String,
     place: Place,
@@ -114,8 +114,8 @@ pub(super) struct StreamBus<P: Protocol> {
     is_up: bool,
     /// Why the last connection failed.
     failure: Option<String>,
-    /// The channel before the first change of the bit rate.
-    before: Option<Option<(u32, Mode)>>,
+    /// The channel from before the first change of the bit rate.
+    original_channel: Option<Option<(u32, Mode)>>,
 }
 
 impl<P: Protocol> StreamBus<P> {
@@ -141,17 +141,17 @@ impl<P: Protocol> StreamBus<P> {
             filters: Filters::All,
             is_up: false,
             failure: None,
-            before: None,
+            original_channel: None,
         };
         bus.connect();
-        bus.until_open()?;
+        bus.wait_until_open()?;
         bus.out.events.clear();
         bus.is_up = true;
         Ok(bus)
     }
 
-    /// Waits until the protocol is open, or has failed at each address.
-    fn until_open(&mut self) -> Result<(), BusError> {
+    /// Waits until the protocol is open. Fails if the connection failed at each address.
+    fn wait_until_open(&mut self) -> Result<(), BusError> {
         loop {
             if self.interrupts.take() {
                 let source = io::ErrorKind::Interrupted.into();
@@ -180,7 +180,7 @@ impl<P: Protocol> StreamBus<P> {
         };
         match opened {
             Ok(port) => self.link = Link::Connecting(port, now.mono + CONNECT_TIMEOUT),
-            Err(error) => self.fail(plain(&error)),
+            Err(error) => self.fail(describe(&error)),
         }
         if let (Link::Connecting(..), Place::Serial(..)) = (&self.link, &self.place) {
             self.check_connection(now);
@@ -198,14 +198,14 @@ impl<P: Protocol> StreamBus<P> {
                 }
                 Ok(false) if now.mono >= until => self.fail("the host does not answer".to_owned()),
                 Ok(false) => self.link = Link::Connecting(port, until),
-                Err(error) => self.fail(plain(&error)),
+                Err(error) => self.fail(describe(&error)),
             },
             other => self.link = other,
         }
     }
 
-    /// Closes the connection. The next address of the host is tried at once; after the last one, all again after a
-    /// pause.
+    /// Closes the connection. If it was not established yet, tries the next address of the host at once. Otherwise, or
+    /// after the last address, waits before the next attempt.
     fn fail(&mut self, why: String) {
         let was_connecting = !matches!(self.link, Link::Up(_));
         self.failure = Some(why);
@@ -239,7 +239,7 @@ impl<P: Protocol> StreamBus<P> {
             port.map(|port| (port as &dyn Waitable, writes)).into_iter().collect();
         let ready = match wait(&sources, &mut self.interrupts, limit) {
             Ok(ready) => ready.first().copied().unwrap_or(false),
-            Err(error) => return self.fail(plain(&error)),
+            Err(error) => return self.fail(describe(&error)),
         };
         let now = self.now();
         match &self.link {
@@ -272,7 +272,7 @@ impl<P: Protocol> StreamBus<P> {
         let mut buffer = [0; 4096];
         let result = match port.read(&mut buffer) {
             Ok(count) => self.protocol.receive(&buffer[..count], now, &mut self.out),
-            Err(error) => Err(plain(&error)),
+            Err(error) => Err(describe(&error)),
         };
         if let Err(why) = result {
             self.fail(why);
@@ -285,12 +285,12 @@ impl<P: Protocol> StreamBus<P> {
             match port.write(&self.out.bytes) {
                 Ok(0) => return,
                 Ok(count) => drop(self.out.bytes.drain(..count)),
-                Err(error) => return self.fail(plain(&error)),
+                Err(error) => return self.fail(describe(&error)),
             }
         }
     }
 
-    /// Waits until all accepted frames were sent.
+    /// Waits until all accepted frames were sent, at most [`CLOSE_TIMEOUT`].
     fn drain(&mut self) {
         let until = self.mono() + CLOSE_TIMEOUT;
         while matches!(self.link, Link::Up(_))
@@ -305,7 +305,7 @@ impl<P: Protocol> StreamBus<P> {
         self.drain();
         let now = self.now();
         self.protocol.set_channel(to, now, &mut self.out)?;
-        self.until_open()?;
+        self.wait_until_open()?;
         self.out.events.clear();
         match self.protocol.take_refusal() {
             Some(why) => {
@@ -317,14 +317,14 @@ impl<P: Protocol> StreamBus<P> {
     }
 }
 
-/// Text of the other side, safe for a terminal.
+/// Makes a text from the other side safe for a terminal.
 pub(super) fn printable(text: &str) -> String {
     let safe = |letter: char| if letter.is_ascii_graphic() || letter == ' ' { letter } else { '?' };
     text.chars().take(80).map(safe).collect()
 }
 
-/// The text of an error, without the error number of the operating system.
-fn plain(error: &io::Error) -> String {
+/// Describes an error: common errors in plain words, others with the text of the operating system.
+fn describe(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::ConnectionRefused => "connection refused: no server listens there".to_owned(),
         io::ErrorKind::NotFound => "there is no such device".to_owned(),
@@ -344,12 +344,12 @@ impl<P: Protocol> BitRateControl for StreamBus<P> {
 
     fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
         let before = self.protocol.channel();
-        self.before.get_or_insert(before);
+        self.original_channel.get_or_insert(before);
         self.set_channel(Some((bit_rate, mode)))
     }
 
     fn restore_bit_rate(&mut self) -> Result<(), BusError> {
-        match self.before.take() {
+        match self.original_channel.take() {
             Some(before) => self.set_channel(before),
             None => Ok(()),
         }
@@ -382,9 +382,9 @@ impl<P: Protocol> Bus for StreamBus<P> {
         if !self.is_up {
             return Err(BusError::Down(self.name.clone()));
         }
-        if self.out.bytes.len() > MAX_WAITING {
+        if self.out.bytes.len() > MAX_UNSENT_BYTES {
             self.flush();
-            if self.out.bytes.len() > MAX_WAITING {
+            if self.out.bytes.len() > MAX_UNSENT_BYTES {
                 return Err(BusError::QueueFull);
             }
         }

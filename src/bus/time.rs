@@ -70,7 +70,7 @@ impl Wall {
         self.0
     }
 
-    /// The same moment for the standard library; at most [`Wall::LAST`].
+    /// Converts to the type of the standard library; at most [`Wall::LAST`].
     pub fn system_time(self) -> SystemTime {
         SystemTime::UNIX_EPOCH + self.0.min(Wall::LAST.0)
     }
@@ -99,7 +99,7 @@ pub struct Stamp {
 pub struct HostClock(Instant);
 
 impl HostClock {
-    /// A clock whose monotonic time starts now.
+    /// Creates a clock whose monotonic time starts now.
     #[expect(clippy::new_without_default, reason = "it reads a clock")]
     pub fn new() -> HostClock {
         HostClock(Instant::now())
@@ -111,8 +111,8 @@ impl HostClock {
     }
 }
 
-/// The microseconds that the local time of the host is ahead of UTC, `at` microseconds after 1970; 0 if that is
-/// unknown.
+/// Returns how far the local time of the host is ahead of UTC at the moment `at`; 0 if unknown. Both values are in
+/// microseconds, and `at` counts from 1970.
 #[cfg(unix)]
 #[allow(unsafe_code)]
 pub fn ahead_of_utc(at: i64) -> i64 {
@@ -122,19 +122,19 @@ pub fn ahead_of_utc(at: i64) -> i64 {
     let mut fields: libc::tm = unsafe { std::mem::zeroed() };
     // SAFETY: `localtime_r` reads and writes only the values that it is given.
     let is_known = unsafe { !libc::localtime_r(&raw const seconds, &raw mut fields).is_null() };
-    // It has another type on some systems.
+    // `tm_gmtoff` has another type on some systems.
     #[allow(clippy::useless_conversion)]
     let seconds = i64::from(fields.tm_gmtoff);
     if is_known { seconds * 1_000_000 } else { 0 }
 }
 
-/// Time zones are unknown on this system.
+/// Returns 0, because time zones are unknown on this system.
 #[cfg(not(unix))]
 pub fn ahead_of_utc(_: i64) -> i64 {
     0
 }
 
-/// A duration as text for users: `500 ms`, `5 s`, `2.5 s`, `1h 30m`.
+/// Formats a duration for users: `500 ms`, `5 s`, `2.5 s`, `1h 30m`.
 pub fn format_duration(length: Duration) -> String {
     let milliseconds = length.as_millis();
     if length >= Duration::from_secs(60) {

@@ -10,7 +10,7 @@ use std::time::Duration;
 const FLUSH_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A bus that writes a trace, one line per frame: `(1436509052.249713) can0 044#2A366C2BBA`. A file `*.pcapng` is
-/// written in that format.
+/// written in the pcapng format instead.
 ///
 /// If writing fails, [`Bus::receive`] returns the error once, between two frames, and the trace ends. The bus keeps
 /// working, so that the caller can clean up.
@@ -26,7 +26,7 @@ pub struct Traced<B> {
 }
 
 impl<B: Bus> Traced<B> {
-    /// Writes the traffic of `bus` to `out`, which error messages call `file`.
+    /// Writes the traffic of `bus` to `out`. `file` is the name for error messages; its extension selects the format.
     pub fn new(bus: B, out: Box<dyn Write>, file: &str) -> Traced<B> {
         let name = bus.name().to_owned();
         let is_capture = file.ends_with(".pcapng");
@@ -34,12 +34,12 @@ impl<B: Bus> Traced<B> {
         let mut traced = Traced { bus, name, file, is_capture, out, buffered_since: None, failed: None };
         if let (true, Some(out)) = (is_capture, &mut traced.out) {
             let written = out.write_all(&pcapng::header(&traced.name));
-            traced.check(written);
+            traced.check_written(written);
         }
         traced
     }
 
-    fn line(&mut self, at: Stamp, frame: &Frame, is_sent: bool) {
+    fn write_frame(&mut self, at: Stamp, frame: &Frame, is_sent: bool) {
         let Some(out) = &mut self.out else { return };
         let written = if self.is_capture {
             out.write_all(&pcapng::packet(at.wall, frame, is_sent))
@@ -47,7 +47,7 @@ impl<B: Bus> Traced<B> {
             write_line(out, at.wall, &self.name, frame)
         };
         let since = *self.buffered_since.get_or_insert(at.mono);
-        self.check(written);
+        self.check_written(written);
         if at.mono.since(since) >= FLUSH_INTERVAL {
             self.flush();
         }
@@ -57,14 +57,14 @@ impl<B: Bus> Traced<B> {
         self.buffered_since = None;
         if let Some(out) = &mut self.out {
             let flushed = out.flush();
-            self.check(flushed);
+            self.check_written(flushed);
         }
     }
 
-    fn check(&mut self, written: io::Result<()>) {
+    fn check_written(&mut self, written: io::Result<()>) {
         if let Err(source) = written {
             self.failed = Some(BusError::File { what: format!("write trace {}", self.file), source });
-            // Dropping the writer would try to write the rest again.
+            // If the writer were dropped here, it would try to write the rest again.
             if let Some(out) = self.out.take() {
                 let _ = out.into_parts();
             }
@@ -96,7 +96,7 @@ impl<B: Bus> Bus for Traced<B> {
         // The clock is read before sending, because an answer may arrive before a later reading.
         let at = self.bus.now();
         self.bus.send(frame)?;
-        self.line(at, frame, true);
+        self.write_frame(at, frame, true);
         Ok(())
     }
 
@@ -111,7 +111,7 @@ impl<B: Bus> Bus for Traced<B> {
                 Event::Timeout if until < deadline => self.flush(),
                 event => {
                     if let Event::Frame(Received { frame, at }) = &event {
-                        self.line(*at, frame, false);
+                        self.write_frame(*at, frame, false);
                     }
                     return Ok(event);
                 }

@@ -4,7 +4,7 @@ use std::io::stdin;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 
-/// The lines of stdin, read by a separate thread. It ends with the program.
+/// The lines of stdin, read by a separate thread that ends with the program.
 pub struct TypedLines(Receiver<String>);
 
 impl TypedLines {
@@ -15,7 +15,7 @@ impl TypedLines {
         TypedLines(typed)
     }
 
-    /// The next line that was typed, without waiting: `Ok(None)` if there is none.
+    /// Returns the next typed line; `Ok(None)` if there is none. Does not wait.
     ///
     /// # Errors
     /// The input has ended.

@@ -27,7 +27,7 @@ impl Emergency {
         Some(Emergency { code: u16::from_le_bytes([*low, *high]), register, manufacturer })
     }
 
-    /// The meaning of an error code by its class (CiA 301, table 26). Used if the description has no text for the code.
+    /// Returns the meaning of an error code or its class (CiA 301, table 26). Used if the device description has none.
     pub fn class(code: u16) -> &'static str {
         match code {
             0x8110 => "CAN overrun",

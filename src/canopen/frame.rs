@@ -27,7 +27,7 @@ pub enum FrameError {
 }
 
 impl Frame {
-    /// A data frame of 0 to 8 bytes.
+    /// Creates a data frame of 0 to 8 bytes.
     ///
     /// # Errors
     /// [`FrameError::TooLong`] if `data` has more than 8 bytes.
@@ -42,27 +42,27 @@ impl Frame {
         }
     }
 
-    /// A data frame of exactly eight bytes, as in SDO and LSS.
+    /// Creates a data frame of exactly eight bytes, as in SDO and LSS.
     pub fn full(id: CanId, data: [u8; 8]) -> Frame {
         Frame { id, remote: false, len: 8, data }
     }
 
-    /// A data frame without data, such as SYNC (CiA 301, 7.2.5).
+    /// Creates a data frame without data, such as SYNC (CiA 301, 7.2.5).
     pub fn empty(id: CanId) -> Frame {
         Frame { id, remote: false, len: 0, data: [0; 8] }
     }
 
-    /// A data frame of one byte, such as a heartbeat.
+    /// Creates a data frame of one byte, such as a heartbeat.
     pub fn byte(id: CanId, byte: u8) -> Frame {
         Frame { id, remote: false, len: 1, data: [byte, 0, 0, 0, 0, 0, 0, 0] }
     }
 
-    /// A data frame of two bytes, such as an NMT command.
+    /// Creates a data frame of two bytes, such as an NMT command.
     pub fn pair(id: CanId, first: u8, second: u8) -> Frame {
         Frame { id, remote: false, len: 2, data: [first, second, 0, 0, 0, 0, 0, 0] }
     }
 
-    /// A remote transmission request for `len` bytes, 0 to 8.
+    /// Creates a remote transmission request for `len` bytes, 0 to 8.
     ///
     /// # Errors
     /// [`FrameError::TooLong`] if `len` is above 8.

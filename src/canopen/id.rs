@@ -1,7 +1,7 @@
 //! Node-IDs and CAN identifiers. Their constructors check the range.
 //!
-//! The predefined connection set is that of CiA 301, 7.3.3: function code in bits 10 to 7, node-ID in bits 6 to 0. The
-//! LSS identifiers are those of CiA 305.
+//! The predefined connection set follows CiA 301, 7.3.3: function code in bits 10 to 7, node-ID in bits 6 to 0. The
+//! LSS identifiers follow CiA 305.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -41,7 +41,7 @@ impl NodeId {
         (1..=127).map(NodeId)
     }
 
-    fn of(id: CanId, function: u16) -> Option<NodeId> {
+    fn from_cob_id(id: CanId, function: u16) -> Option<NodeId> {
         match id {
             CanId::Standard(id) if id & 0x780 == function && id & 0x7f != 0 => Some(NodeId((id & 0x7f) as u8)),
             _ => None,
@@ -106,7 +106,7 @@ impl CanId {
         (id <= 0x1fff_ffff).then_some(CanId::Extended(id))
     }
 
-    /// The number of the identifier, without its width.
+    /// Returns the number of the identifier, without the width (11 or 29 bits).
     pub fn number(self) -> u32 {
         match self {
             CanId::Standard(id) => u32::from(id),
@@ -114,44 +114,44 @@ impl CanId {
         }
     }
 
-    /// SDO requests to `node`, 600h + node-ID.
+    /// Returns the COB-ID of SDO requests to `node`: 600h + node-ID.
     pub fn sdo_request(node: NodeId) -> CanId {
         CanId::Standard(0x600 + u16::from(node.0))
     }
 
-    /// SDO answers of `node`, 580h + node-ID.
+    /// Returns the COB-ID of SDO answers from `node`: 580h + node-ID.
     pub fn sdo_response(node: NodeId) -> CanId {
         CanId::Standard(0x580 + u16::from(node.0))
     }
 
-    /// Heartbeat, boot-up and node guarding of `node`, 700h + node-ID.
+    /// Returns the COB-ID of heartbeat, boot-up and node guarding of `node`: 700h + node-ID.
     pub fn heartbeat(node: NodeId) -> CanId {
         CanId::Standard(0x700 + u16::from(node.0))
     }
 
-    /// The predefined EMCY identifier of `node`, 080h + node-ID.
+    /// Returns the predefined EMCY identifier of `node`: 080h + node-ID.
     pub fn emergency(node: NodeId) -> CanId {
         CanId::Standard(0x080 + u16::from(node.0))
     }
 
     /// The node whose SDO server sends with this identifier.
     pub fn sdo_response_node(self) -> Option<NodeId> {
-        NodeId::of(self, 0x580)
+        NodeId::from_cob_id(self, 0x580)
     }
 
     /// The node whose SDO server receives this identifier.
     pub fn sdo_request_node(self) -> Option<NodeId> {
-        NodeId::of(self, 0x600)
+        NodeId::from_cob_id(self, 0x600)
     }
 
     /// The node whose heartbeat, boot-up message or node guarding answer has this identifier.
     pub fn heartbeat_node(self) -> Option<NodeId> {
-        NodeId::of(self, 0x700)
+        NodeId::from_cob_id(self, 0x700)
     }
 
     /// The node with this predefined EMCY identifier.
     pub fn emergency_node(self) -> Option<NodeId> {
-        NodeId::of(self, 0x080)
+        NodeId::from_cob_id(self, 0x080)
     }
 
     /// Whether this is one of the predefined identifiers of PDOs, 180h to 57Fh.
@@ -171,10 +171,11 @@ impl CanId {
     }
 }
 
-/// A hash map by identifier, for keys that the program chooses: frames from the bus are only looked up.
+/// A hash map with identifiers as keys. The hash is fast, but not safe if others choose the keys. So only the program
+/// adds keys, and frames from the bus are only looked up.
 pub type CanIdMap<V> = HashMap<CanId, V, BuildHasherDefault<CanIdHasher>>;
 
-/// A hash of an identifier in a few instructions.
+/// Hashes an identifier in a few instructions.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CanIdHasher(u64);
 
@@ -195,7 +196,7 @@ impl Hasher for CanIdHasher {
         self.0 = (self.0.rotate_left(32) ^ number).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     }
 
-    /// The width of the identifier.
+    /// Hashes the discriminant of [`CanId`]: the width of the identifier.
     fn write_isize(&mut self, number: isize) {
         self.write_u64(u64::from(number != 0));
     }
@@ -218,7 +219,7 @@ impl fmt::Display for CanId {
 /// The bit rates of classic CAN, in bit/s.
 const BIT_RATES: std::ops::RangeInclusive<u32> = 1_000..=1_000_000;
 
-/// A bit rate of CAN in bit/s: `250k`, `1M`, `125000`.
+/// Parses a CAN bit rate (`250k`, `1M`, `125000`). Returns bit/s.
 ///
 /// # Errors
 /// The text is not a bit rate.

@@ -45,7 +45,7 @@ impl NmtCommand {
         Frame::pair(CanId::NMT, self.specifier(), node.map_or(0, NodeId::get))
     }
 
-    /// The state of a node after the command. A reset ends in PRE-OPERATIONAL, unless the device starts by itself.
+    /// The state of a node after the command. A reset ends in PRE-OPERATIONAL, unless the device starts itself.
     pub fn target(self) -> NmtState {
         match self {
             NmtCommand::Start => NmtState::Operational,
@@ -139,7 +139,7 @@ impl Life {
         }
     }
 
-    /// The node and the length of a frame on 700h + node-ID, unless the frame has one byte as CiA 301 requires.
+    /// Returns the node and the length of a frame on 700h + node-ID; `None` if it has one byte, as CiA 301 requires.
     pub fn unusual_length(frame: &Frame) -> Option<(NodeId, usize)> {
         let node = frame.id().heartbeat_node().filter(|_| !frame.is_remote())?;
         let length = frame.data().len();
@@ -147,7 +147,7 @@ impl Life {
     }
 }
 
-/// The node that sent this boot-up message; `None` if the frame is not one.
+/// Returns the node that sent this boot-up message; `None` for other frames.
 pub fn booted(frame: &Frame) -> Option<NodeId> {
     Life::parse(frame).filter(|(_, life)| *life == Life::BootUp).map(|(node, _)| node)
 }

@@ -38,13 +38,13 @@ impl ObjectId {
         ObjectId { index: u16::from_le_bytes([bytes[0], bytes[1]]), sub: bytes[2] }
     }
 
-    /// Whether a text is an address, or looks like one although it is wrong: `12345`, `6130:300`. It is not a name then.
+    /// Whether a text is an address, or a wrong address (`12345`, `6130:300`), and therefore not a name.
     pub fn reads_as_address(text: &str) -> bool {
         let is_part = |character: char| character.is_ascii_hexdigit() || "xXhH:.".contains(character);
         let index = text.split([':', '.']).next().unwrap_or(text);
         let is_long = index.len() >= 4 || index.starts_with("0x") || index.starts_with("0X");
-        let starts = text.starts_with(|first: char| first.is_ascii_digit());
-        text.parse::<ObjectId>().is_ok() || starts && is_long && text.chars().all(is_part)
+        let has_first_digit = text.starts_with(|first: char| first.is_ascii_digit());
+        text.parse::<ObjectId>().is_ok() || has_first_digit && is_long && text.chars().all(is_part)
     }
 
     /// The object at the same index and another sub-index.

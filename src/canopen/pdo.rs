@@ -139,7 +139,7 @@ impl fmt::Display for Transmission {
 pub struct MappingEntry {
     /// The mapped object.
     pub object: ObjectId,
-    /// Its length in bits, 0 to 255.
+    /// The length of the object in bits, 0 to 255.
     pub bits: u8,
 }
 
@@ -183,7 +183,7 @@ impl Field {
     }
 }
 
-/// The fields of a mapping: each starts at the end of the previous one (CiA 301, 7.5.2.36).
+/// Returns the fields of a mapping. Each field starts at the end of the previous field (CiA 301, 7.5.2.36).
 ///
 /// Some devices set the highest bit of an entry's length. A PDO has at most 64 bits, so the lower seven bits are used.
 pub fn lay_out(mapping: &[MappingEntry]) -> Vec<Field> {

@@ -49,7 +49,7 @@ impl DataType {
         matches!(self, Boolean | Unsigned(_) | Integer(_) | Real32 | Real64)
     }
 
-    /// The type with this code (CiA 301, table 44), as used in EDS files.
+    /// Returns the type with this code (CiA 301, table 44), as used in EDS files.
     pub fn from_code(code: u16) -> Option<DataType> {
         Some(match code {
             0x01 => DataType::Boolean,
@@ -239,7 +239,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// The number as a REAL64; `None` if the value is not a number. Integers above 2^53 are rounded.
+    /// Returns the number as a REAL64; `None` if the value is not a number. Integers above 2^53 are rounded.
     pub fn as_f64(&self) -> Option<f64> {
         match self {
             Value::Unsigned(number) => Some(*number as f64),
@@ -250,7 +250,7 @@ impl Value {
         }
     }
 
-    /// The value as an unsigned integer; `None` if it is negative or not an integer. `true` is 1.
+    /// Returns the value as an unsigned integer; `None` if it is negative or not an integer. `true` is 1.
     pub fn as_u64(&self) -> Option<u64> {
         match self {
             Value::Bool(bit) => Some(u64::from(*bit)),
@@ -262,8 +262,8 @@ impl Value {
 }
 
 impl fmt::Display for Value {
-    /// The value as printed: integers in decimal, bytes in hexadecimal, text unchanged. A real is the shortest text
-    /// that parses to the same number.
+    /// Prints integers in decimal, bytes in hexadecimal, and text unchanged. A real is printed as the shortest text that
+    /// parses to the same number.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Value::Bool(bit) => write!(f, "{}", u8::from(*bit)),
@@ -324,7 +324,7 @@ pub enum ValueError {
     Form {
         /// The typed text.
         text: String,
-        /// The type asked for.
+        /// The requested type.
         data_type: DataType,
     },
     /// A number outside the type's range.
@@ -332,7 +332,7 @@ pub enum ValueError {
     Range {
         /// The typed text.
         text: String,
-        /// The type asked for.
+        /// The requested type.
         data_type: DataType,
         /// The lowest number of the type.
         low: String,

@@ -6,12 +6,12 @@ use super::id::CanId;
 use std::time::Duration;
 
 /// Bits after the CRC, without stuff bits: CRC delimiter, acknowledge slot and delimiter, seven bits end of frame.
-const TAIL: u32 = 10;
+const TAIL_BITS: u32 = 10;
 
 /// The intermission between two frames, in bits.
 pub const INTERMISSION: u32 = 3;
 
-/// The length of `frame` in bits, with stuff bits, without the intermission.
+/// Returns the length of `frame` in bits, with stuff bits, without the intermission.
 pub fn frame_bits(frame: &Frame) -> u32 {
     let mut wire = Wire::new();
     wire.put(0, 1);
@@ -37,20 +37,20 @@ pub fn frame_bits(frame: &Frame) -> u32 {
         wire.put(u32::from(byte), 8);
     }
     wire.put_crc();
-    wire.bits + TAIL
+    wire.bits + TAIL_BITS
 }
 
-/// The time that `frame` and its intermission take at `bit_rate` bit/s.
+/// Returns the time that `frame` and its intermission take at `bit_rate` bit/s.
 pub fn frame_time(frame: &Frame, bit_rate: u32) -> Duration {
     bit_time(frame_bits(frame) + INTERMISSION, bit_rate)
 }
 
-/// The duration of `bits` at `bit_rate` bit/s. A bit rate of 0 counts as 1 bit/s.
+/// Returns the duration of `bits` at `bit_rate` bit/s. A bit rate of 0 counts as 1 bit/s.
 pub fn bit_time(bits: u32, bit_rate: u32) -> Duration {
     Duration::from_nanos(u64::from(bits) * 1_000_000_000 / u64::from(bit_rate.max(1)))
 }
 
-/// The arbitration field in wire order, left-aligned. If two frames start at the same time, the smaller number wins.
+/// Returns the arbitration field in wire order, left-aligned. If two frames start at the same time, the smaller number wins.
 pub fn priority(frame: &Frame) -> u32 {
     let remote = u32::from(frame.is_remote());
     match frame.id() {
@@ -136,8 +136,8 @@ mod tests {
         wire.crc
     }
 
-    /// The CRC by polynomial division of a list of bits, as a reference for the shift register.
-    fn divided(bits: &[u8]) -> u16 {
+    /// Computes the CRC by polynomial division of a list of bits, as a reference for the shift register.
+    fn remainder(bits: &[u8]) -> u16 {
         let mut rest: Vec<u8> = bits.iter().copied().chain([0; 15]).collect();
         let divisor = [1, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1];
         for at in 0..bits.len() {
@@ -152,10 +152,10 @@ mod tests {
     fn crc_is_the_remainder_of_the_division() {
         // 080#: SOF, 000 1000 0000, RTR IDE r0, DLC 0000.
         let sync = [0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
-        assert_eq!(crc("080#"), divided(&sync));
+        assert_eq!(crc("080#"), remainder(&sync));
         // 555#AA: SOF, 101 0101 0101, 000, 0001, 1010 1010.
         let other = [0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 1, 1, 0, 1, 0, 1, 0, 1, 0];
-        assert_eq!(crc("555#AA"), divided(&other));
+        assert_eq!(crc("555#AA"), remainder(&other));
         assert_eq!(crc("000#"), 0);
     }
 
@@ -239,8 +239,8 @@ mod tests {
                 let frame = if remote { Frame::remote(id, len) } else { Frame::new(id, &data) }.expect("at most 8");
                 let stuffable = if extended { 54 } else { 34 } + if remote { 0 } else { 8 * u32::from(len) };
                 let bits = frame_bits(&frame);
-                prop_assert!(bits >= stuffable + TAIL);
-                prop_assert!(bits <= stuffable + TAIL + (stuffable - 1) / 4);
+                prop_assert!(bits >= stuffable + TAIL_BITS);
+                prop_assert!(bits <= stuffable + TAIL_BITS + (stuffable - 1) / 4);
             }
         }
 }

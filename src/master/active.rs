@@ -12,11 +12,11 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, TransferError, Uploaded, Violation};
 use std::time::Duration;
 
-/// The time allowed for any transfer.
-const SLOW_TRANSFER: Duration = Duration::from_secs(5);
+/// The shortest time limit of a transfer.
+const MIN_TRANSFER_LIMIT: Duration = Duration::from_secs(5);
 
-/// The time allowed for each byte. A full segment needs less than 0.2 s, also on a loaded bus with 10 kbit/s.
-const SLOWEST_BYTE: Duration = Duration::from_millis(30);
+/// The additional time limit for each byte. A full segment needs less than 0.2 s, also on a loaded bus with 10 kbit/s.
+const TIME_PER_BYTE: Duration = Duration::from_millis(30);
 
 /// A transfer in progress.
 #[derive(Debug)]
@@ -29,7 +29,7 @@ pub(super) struct ActiveTransfer {
     /// The number of our frames that still wait to be sent.
     pub(super) unsent: usize,
     pub(super) attempts_left: u32,
-    /// How often a transfer that fails in the middle is restarted.
+    /// How often the transfer may still be restarted after a failure in the middle.
     pub(super) restarts_left: u32,
     /// Whether a read was rejected because the node still had a transfer in progress. The read was repeated.
     pub(super) was_rejected: bool,
@@ -40,11 +40,11 @@ pub(super) struct ActiveTransfer {
     pub(super) foreign: ForeignTraffic,
     /// The transfer of the caller. It waits for a barrier read, which makes sure that no stale answer is pending.
     pub(super) deferred: Option<(Ticket, Request)>,
-    /// Whether another master wrote the same object. The acknowledgements of both writes are equal.
+    /// Whether another master wrote the same object. The acknowledgement may then be for either write.
     pub(super) ambiguous: bool,
     /// The bytes of a first read whose length is doubtful. The object is read once more.
     pub(super) doubtful: Option<Vec<u8>>,
-    /// Whether the request was sent more than once. More than one answer may come then.
+    /// Whether the request was sent more than once. Then more than one answer may arrive.
     pub(super) is_repeated: bool,
 }
 
@@ -60,7 +60,7 @@ pub(super) enum LengthCheck {
 
 impl ActiveTransfer {
     pub(super) fn new(ticket: Ticket, request: Request, accept_60: bool, timing: &Timing) -> ActiveTransfer {
-        // If the server does not answer a block request, the next request is a segmented one, not a retry.
+        // If the server does not answer a block request, the next request is a segmented request, not a retry.
         let attempts = if request.falls_back() { 0 } else { timing.retries };
         let attempts_left = if request.repeatable { attempts } else { 0 };
         let machine = request.machine(accept_60);
@@ -86,7 +86,7 @@ impl ActiveTransfer {
     }
 
     /// Checks the length of the bytes read. If the length differs from the announced one, the object is read once more.
-    /// If the bytes are the same, they are accepted with a note.
+    /// If both reads give the same bytes, the bytes are accepted with a note.
     pub(super) fn check_length(&mut self, uploaded: Option<&Uploaded>, accept_60: bool) -> LengthCheck {
         let Some(uploaded) = uploaded else { return LengthCheck::Accepted };
         match self.doubtful.take() {
@@ -101,7 +101,7 @@ impl ActiveTransfer {
         }
     }
 
-    /// The failure of a transfer that was disturbed by unexpected frames.
+    /// Returns the failure of a transfer that was disturbed by unexpected frames.
     pub(super) fn disturbance(&self) -> SdoFailure {
         if self.foreign.is_requested() { SdoFailure::Disturbed } else { SdoFailure::TwoDevices(None) }
     }
@@ -128,8 +128,8 @@ impl ActiveTransfer {
         self.unsent > 0 && in_segments && frame.data().first() != Some(&0x80)
     }
 
-    /// Waits for a foreign transfer to end, then restarts. `false` if the transfer must not be repeated, or if the time
-    /// limit has passed. No abort is sent, because it would end the foreign transfer.
+    /// Waits for a foreign transfer to end, then restarts. Returns `false` if the transfer must not be repeated, or if
+    /// the time limit has passed. No abort is sent, because it would end the foreign transfer.
     pub(super) fn back_off(&mut self, accept_60: bool, now: Mono, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let limit = self.timeout(timing) * (1 + timing.retries);
         if !self.request.repeatable || !self.foreign.back_off(now, limit) {
@@ -177,8 +177,8 @@ impl ActiveTransfer {
         out.push(self.machine.request());
     }
 
-    /// Restarts a transfer after this failure. `false` if a restart is not allowed or would not help. `out` contains
-    /// the abort for the server.
+    /// Restarts a transfer after this failure. Returns `false` if a restart is not allowed or would not help. `out`
+    /// contains the abort for the server.
     pub(super) fn restart(
         &mut self,
         error: TransferError,
@@ -193,7 +193,7 @@ impl ActiveTransfer {
             // A server with an interrupted transfer rejects the first request, and accepts the next one. It also does
             // this if a corrupted request started another transfer, and our abort ended that transfer.
             self.was_rejected = true;
-        } else if has_begun && is_of_transmission(error) && self.restarts_left > 0 {
+        } else if has_begun && is_transmission_failure(error) && self.restarts_left > 0 {
             self.restarts_left -= 1;
         } else {
             return false;
@@ -208,11 +208,11 @@ impl ActiveTransfer {
 
     /// Whether the transfer failed only because the server does not support block transfer.
     pub(super) fn lacks_block_transfer(&self, error: TransferError) -> bool {
-        // The CRC of some devices includes the padding of the last segment.
+        // Some devices include the padding of the last segment in the CRC. A segmented read may still succeed.
         if matches!(error, TransferError::Violation(Violation::Crc, _)) {
             return self.request.operation() == Operation::Read && self.request.falls_back();
         }
-        // An abort code about the object itself would be repeated. A write with an unknown answer is not repeated,
+        // A segmented request would get the same abort code about the object. A write with an unknown answer is not repeated,
         // because it may have had an effect.
         let refused = match error {
             TransferError::Aborted(code) => !is_about_object(code),
@@ -246,7 +246,7 @@ impl ActiveTransfer {
     /// byte per segment, each just before the time-out.
     pub(super) fn time(&self, timing: &Timing) -> Duration {
         let bytes = u32::try_from(self.machine.moved().0).unwrap_or(u32::MAX);
-        SLOW_TRANSFER.max(self.timeout(timing).saturating_mul(10)).saturating_add(SLOWEST_BYTE * bytes)
+        MIN_TRANSFER_LIMIT.max(self.timeout(timing).saturating_mul(10)).saturating_add(TIME_PER_BYTE * bytes)
     }
 
     /// Whether the transfer is too slow.
@@ -275,15 +275,15 @@ impl ActiveTransfer {
     }
 }
 
-/// Whether the server has started a block transfer that was not requested, because a bit of the request was changed. It
-/// would treat the next requests as part of this transfer.
+/// Whether the server has started a block transfer that was not requested, because a bit of the request was changed. The
+/// server would treat the next requests as part of this transfer.
 pub(super) fn begins_blocks(error: TransferError) -> bool {
     let TransferError::Violation(Violation::Command, frame) = error else { return false };
     frame.data().first().is_some_and(|command| matches!(command & 0xe1, 0xa0 | 0xc0))
 }
 
 /// Whether a lost or changed frame can cause this failure in the middle of a transfer.
-fn is_of_transmission(error: TransferError) -> bool {
+fn is_transmission_failure(error: TransferError) -> bool {
     match error {
         TransferError::Violation(Violation::TooLong, _) => false,
         TransferError::Violation(..) | TransferError::NoAnswer => true,

@@ -1,14 +1,14 @@
 //! Detects another master on the same SDO channel.
 //!
-//! An SDO server carries out one transfer at a time. If another master starts a segmented transfer during ours, the
-//! server continues with the new transfer. A segment does not identify its transfer. So our next seven bytes may come
+//! An SDO server carries out one transfer at a time. If another master starts a segmented transfer during our transfer,
+//! the server continues with the new transfer. A segment does not identify its transfer. So our next seven bytes may come
 //! from another object, or from the start of the object.
 //!
 //! Two kinds of frames show such a transfer. Each received request is foreign, because a bus does not return our own
 //! frames. And the server announces each segmented transfer that it starts.
 //!
-//! In that case our transfer waits until the foreign transfer has ended, and then restarts. A foreign expedited
-//! transfer between two of our segments is harmless: the server continues ours or aborts it.
+//! If such frames are received, our transfer waits until the foreign transfer has ended, and then restarts. A foreign expedited
+//! transfer between two of our segments is harmless: the server continues or aborts our transfer.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
@@ -48,7 +48,7 @@ enum FrameKind {
 }
 
 impl FrameKind {
-    fn of(frame: &Frame) -> Option<FrameKind> {
+    fn from_frame(frame: &Frame) -> Option<FrameKind> {
         let &command = frame.data().first()?;
         let expedited = if command & 0x02 != 0 { FrameKind::Expedited } else { FrameKind::Segments };
         let is_request = frame.id().sdo_request_node().is_some();
@@ -72,7 +72,7 @@ impl FrameKind {
 impl ForeignTraffic {
     /// Records a frame on the channel that does not answer our transfer.
     pub(super) fn record(&mut self, frame: &Frame, now: Mono) {
-        let Some(kind) = FrameKind::of(frame) else { return };
+        let Some(kind) = FrameKind::from_frame(frame) else { return };
         self.seen = true;
         let is_request = frame.id().sdo_request_node().is_some();
         self.answered |= self.requested && !is_request;
@@ -123,8 +123,8 @@ impl ForeignTraffic {
             }
     }
 
-    /// Makes our transfer wait for the end of the foreign transfer. `false` if our transfer has already waited for
-    /// `limit`.
+    /// Makes our transfer wait for the end of the foreign transfer. Returns `false` if our transfer has already
+    /// waited for `limit`.
     pub(super) fn back_off(&mut self, now: Mono, limit: Duration) -> bool {
         let since = *self.since.get_or_insert(now);
         let others = ForeignTraffic { seen: false, in_segments: false, ..*self };
@@ -132,7 +132,7 @@ impl ForeignTraffic {
         now.since(since) < limit
     }
 
-    /// Until when our transfer waits; `None` if it does not wait.
+    /// Returns until when our transfer waits; `None` if it does not wait.
     pub(super) fn back_off_until(self) -> Option<Mono> {
         self.back_off_until
     }
@@ -212,7 +212,7 @@ mod tests {
         traffic.restart();
         assert!(traffic.back_off_until().is_none() && !traffic.conflicts());
         assert!(traffic.is_suspect(Some(10), 8) && !traffic.is_suspect(Some(8), 8));
-        // The limit counts from the first time.
+        // The limit counts from the first back-off.
         assert!(traffic.back_off(ms(1099), LIMIT) && !traffic.back_off(ms(1100), LIMIT));
 
         let mut traffic = after(&["605#A408100020000000"]);

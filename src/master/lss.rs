@@ -30,12 +30,12 @@ const RETRY_PAUSE: Duration = Duration::from_millis(200);
 /// The wait for answers of further slaves after the first answer.
 const FURTHER_ANSWERS_TIMEOUT: Duration = Duration::from_millis(20);
 
-/// The number of faults that are kept.
+/// The largest number of faults that are stored.
 const MAX_FAULTS: usize = 64;
 
 /// When an exchange ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Until {
+enum EndOfExchange {
     /// Shortly after the first answer.
     Answer,
     /// At the time-out. All slaves have time to answer.
@@ -78,12 +78,12 @@ pub struct Lss<'master, 'bus> {
     is_configuring: bool,
     boot_ups: BTreeMap<NodeId, Stamp>,
     faults: Vec<Fault>,
-    /// The first frame of a slave that did not answer the request.
+    /// The first frame from a slave that was not an answer to the request.
     received: Option<Frame>,
 }
 
 impl<'bus> Master<'bus> {
-    /// The LSS services.
+    /// Returns the LSS services of this master.
     pub fn lss(&mut self) -> Lss<'_, 'bus> {
         Lss { master: self, is_configuring: false, boot_ups: BTreeMap::new(), faults: Vec::new(), received: None }
     }
@@ -99,7 +99,7 @@ impl Drop for Lss<'_, '_> {
 }
 
 impl<'bus> Lss<'_, 'bus> {
-    /// The master, for SDO and NMT between LSS services.
+    /// Returns the master, for SDO and NMT between LSS services.
     pub fn master(&mut self) -> &mut Master<'bus> {
         self.master
     }
@@ -110,8 +110,8 @@ impl<'bus> Lss<'_, 'bus> {
     /// # Errors
     /// The bus rejects the filters.
     pub fn listen(&mut self) -> Result<(), LssError> {
-        let lives = NodeId::all().map(CanId::heartbeat);
-        let ids = [CanId::LSS_SLAVE, CanId::LSS_MASTER].into_iter().chain(lives).collect();
+        let heartbeats = NodeId::all().map(CanId::heartbeat);
+        let ids = [CanId::LSS_SLAVE, CanId::LSS_MASTER].into_iter().chain(heartbeats).collect();
         Ok(self.master.listen(&Filters::Only(ids))?)
     }
 
@@ -153,10 +153,10 @@ impl<'bus> Lss<'_, 'bus> {
     /// does not answer. So all slaves are switched to waiting state before the address is repeated.
     ///
     /// # Errors
-    /// No slave answers, or several do.
+    /// No slave answers, or several slaves answer.
     pub fn switch_selective(&mut self, address: &LssAddress) -> Result<(), LssError> {
         self.is_configuring = true;
-        self.one(Exchange::select(address), self.master.timing.retries).map(|_| ())
+        self.ask_one(Exchange::select(address), self.master.timing.retries).map(|_| ())
     }
 
     /// Reads one number of the LSS address of all slaves in configuration state (5Ah to 5Dh).
@@ -192,7 +192,9 @@ impl<'bus> Lss<'_, 'bus> {
     fn inquire_address_within(&mut self, timeout: Duration, retries: u32) -> Result<LssAddress, LssError> {
         let mut numbers = [0; 4];
         for (number, part) in numbers.iter_mut().zip(Part::ALL) {
-            if let Answer::Number(answer) = self.one_within(Exchange::new(Request::Inquire(part)), timeout, retries)? {
+            if let Answer::Number(answer) =
+                self.ask_one_within(Exchange::new(Request::Inquire(part)), timeout, retries)?
+            {
                 *number = answer;
             }
         }
@@ -205,22 +207,22 @@ impl<'bus> Lss<'_, 'bus> {
     /// # Errors
     /// The slave rejects the request or does not answer, or several slaves answer.
     pub fn configure_node_id(&mut self, node: Option<NodeId>) -> Result<(), LssError> {
-        self.one(Exchange::new(Request::ConfigureNodeId(node)), self.master.timing.retries).map(|_| ())
+        self.ask_one(Exchange::new(Request::ConfigureNodeId(node)), self.master.timing.retries).map(|_| ())
     }
 
-    /// Sets the bit rate of the slave in configuration state by a table index (13h). Table 0 is that of CiA 305. The
-    /// bit rate takes effect after [`Lss::activate`] or a reset.
+    /// Sets the bit rate of the slave in configuration state by a table index (13h). Table 0 is the table of CiA 305.
+    /// The bit rate takes effect after [`Lss::activate`] or a reset.
     ///
     /// # Errors
     /// The slave rejects the request or does not answer, or several slaves answer.
     pub fn configure_bit_timing(&mut self, table: u8, index: u8) -> Result<(), LssError> {
         let request = Request::ConfigureBitTiming { table, index };
-        self.one(Exchange::new(request), self.master.timing.retries).map(|_| ())
+        self.ask_one(Exchange::new(request), self.master.timing.retries).map(|_| ())
     }
 
     /// Activates the new bit rate (15h). The slaves in configuration state stop sending for
-    /// `delay_ms`, change the bit rate, and wait for `delay_ms` again. Slaves do not answer. The command back to
-    /// waiting state must be sent at the new bit rate.
+    /// `delay_ms`, change the bit rate, and wait for `delay_ms` again. Slaves do not answer. The command that
+    /// switches them back to waiting state must be sent at the new bit rate.
     ///
     /// # Errors
     /// The bus failed or the user interrupted.
@@ -234,7 +236,7 @@ impl<'bus> Lss<'_, 'bus> {
     /// # Errors
     /// The slave rejects the request or does not answer, or several slaves answer.
     pub fn store(&mut self) -> Result<(), LssError> {
-        self.one(Exchange::new(Request::Store), 0).map(|_| ())
+        self.ask_one(Exchange::new(Request::Store), 0).map(|_| ())
     }
 
     /// Whether slaves with an address in this range answer (46h to 4Bh).
@@ -253,7 +255,7 @@ impl<'bus> Lss<'_, 'bus> {
         self.ask_all(Exchange::new(Request::IdentifyUnconfigured)).map(|exchange| exchange.has_answer())
     }
 
-    /// Searches for further slaves with the vendor and product of this one (46h to 4Bh).
+    /// Searches for other slaves with the same vendor and product as `address` (46h to 4Bh).
     ///
     /// # Errors
     /// The bus failed, the user interrupted, or an answer violates the protocol.
@@ -277,27 +279,27 @@ impl<'bus> Lss<'_, 'bus> {
     /// Carries out a service that all matching slaves answer in the same way. No answer is also a valid result.
     fn ask_all(&mut self, mut exchange: Exchange) -> Result<Exchange, LssError> {
         let timeout = self.timeout_of(&exchange);
-        self.carry_out(&mut exchange, Until::Answer, (timeout, self.master.timing.retries))?;
+        self.carry_out(&mut exchange, EndOfExchange::Answer, (timeout, self.master.timing.retries))?;
         Ok(exchange)
     }
 
     /// Carries out a service with one slave.
-    fn one(&mut self, exchange: Exchange, retries: u32) -> Result<Answer, LssError> {
+    fn ask_one(&mut self, exchange: Exchange, retries: u32) -> Result<Answer, LssError> {
         let timeout = self.timeout_of(&exchange);
-        self.one_within(exchange, timeout, retries)
+        self.ask_one_within(exchange, timeout, retries)
     }
 
-    /// Like [`Lss::one`], with its own time-out.
-    fn one_within(&mut self, mut exchange: Exchange, timeout: Duration, retries: u32) -> Result<Answer, LssError> {
-        self.carry_out(&mut exchange, Until::Answer, (timeout, retries))?;
+    /// Like [`Lss::ask_one`], with the given time-out.
+    fn ask_one_within(&mut self, mut exchange: Exchange, timeout: Duration, retries: u32) -> Result<Answer, LssError> {
+        self.carry_out(&mut exchange, EndOfExchange::Answer, (timeout, retries))?;
         exchange.one().map_err(|error| self.error(&exchange, error))
     }
 
-    /// Carries out a service with all slaves in configuration state.
+    /// Carries out a service with all slaves in configuration state, and collects the different answers.
     fn gather<T>(&mut self, request: Request, read: impl Fn(Answer) -> Option<T>) -> Result<Gathered<T>, LssError> {
         let mut exchange = Exchange::new(request);
         let timeout = self.timeout_of(&exchange);
-        self.carry_out(&mut exchange, Until::Timeout, (timeout, self.master.timing.retries))?;
+        self.carry_out(&mut exchange, EndOfExchange::Timeout, (timeout, self.master.timing.retries))?;
         let mut answers = Vec::new();
         for &(frame, answer) in exchange.answers() {
             let violation = |violation| self.error(&exchange, ExchangeError::Violation(violation, frame));
@@ -335,10 +337,10 @@ impl<'bus> Lss<'_, 'bus> {
     fn carry_out(
         &mut self,
         exchange: &mut Exchange,
-        until: Until,
+        until: EndOfExchange,
         (timeout, retries): (Duration, u32),
     ) -> Result<(), LssError> {
-        // Frames received before the request do not answer it.
+        // Frames that were received before the request cannot be answers to it.
         self.discard_received()?;
         self.faults.clear();
         self.received = None;
@@ -360,7 +362,7 @@ impl<'bus> Lss<'_, 'bus> {
                 let is_first = !exchange.has_answer();
                 if !exchange.on_frame(&received.frame) {
                     self.received.get_or_insert(received.frame);
-                } else if is_first && until == Until::Answer {
+                } else if is_first && until == EndOfExchange::Answer {
                     deadline = deadline.min(received.at.mono + FURTHER_ANSWERS_TIMEOUT);
                 }
             }
@@ -371,7 +373,7 @@ impl<'bus> Lss<'_, 'bus> {
         Ok(())
     }
 
-    /// Sends a frame. Returns the moment just before.
+    /// Sends a frame. Returns the moment just before the frame was sent.
     fn send_now(&mut self, frame: Frame) -> Result<Mono, LssError> {
         self.master.send(frame);
         loop {
@@ -412,7 +414,7 @@ impl<'bus> Lss<'_, 'bus> {
         }
     }
 
-    /// The next frame of a slave; `None` when `until` is reached.
+    /// Returns the next frame from a slave; `None` when `until` is reached.
     fn next(&mut self, until: Mono) -> Result<Option<Received>, LssError> {
         loop {
             match self.master.next(until)? {

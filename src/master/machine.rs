@@ -34,7 +34,7 @@ impl Machine {
         }
     }
 
-    /// The frame that starts the transfer.
+    /// Returns the frame that starts the transfer.
     pub(super) fn request(&self) -> Frame {
         match self {
             Machine::Read(upload) => upload.request(),
@@ -88,14 +88,14 @@ impl Machine {
         }
     }
 
-    /// The bus has accepted a frame of the transfer.
+    /// Records that the bus has accepted a frame of the transfer.
     pub(super) fn on_sent(&mut self) {
         if let Machine::WriteBlocks(download) = self {
             download.on_sent();
         }
     }
 
-    /// Handles a time-out. `None` if the transfer continues.
+    /// Handles a time-out. Returns `None` if the transfer continues.
     pub(super) fn on_timeout(&mut self, out: &mut Vec<Frame>) -> Option<TransferError> {
         match self {
             Machine::Read(upload) => Some(upload.on_timeout(out)),

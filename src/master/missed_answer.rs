@@ -12,8 +12,8 @@ use std::time::Duration;
 /// Requests without an answer are repeated for this time after a boot-up message.
 const START_TIME: Duration = Duration::from_secs(5);
 
-/// The limit for the total time of repeats without an answer. Reason: random traffic may look like many boot-up
-/// messages.
+/// The limit for the total time of repeats without an answer. It is needed because random traffic may look like many
+/// boot-up messages.
 const TOTAL_REPEAT_LIMIT: Duration = Duration::from_secs(10);
 
 /// Facts about a node that did not answer a request.
@@ -68,17 +68,17 @@ impl Master<'_> {
 }
 
 impl MissedAnswers {
-    /// A request was sent.
+    /// Records that a request was sent.
     pub(super) fn on_request(&mut self, node: NodeId, object: ObjectId) {
         self.open.insert(node, (object, None));
     }
 
-    /// A request without an answer is repeated.
+    /// Records that a request without an answer is repeated.
     pub(super) fn on_repeat(&mut self, node: NodeId) {
         self.repeated.insert(node);
     }
 
-    /// Requests were repeated for this time after a boot-up message, without an answer.
+    /// Adds the time for which requests were repeated after a boot-up message, without an answer.
     pub(super) fn add_time_without_answer(&mut self, time: Duration) {
         self.time_without_answer += time;
     }
@@ -92,7 +92,7 @@ impl MissedAnswers {
         has_started && asked_at.is_none_or(is_recent) && self.time_without_answer < TOTAL_REPEAT_LIMIT
     }
 
-    /// Whether frames with COB-IDs other than those of the nodes are needed.
+    /// Whether frames with other COB-IDs are needed, because the answer to a repeated request may have such a COB-ID.
     pub(super) fn wants_all_frames(&self) -> bool {
         !self.repeated.is_empty()
     }
@@ -102,14 +102,14 @@ impl MissedAnswers {
         !self.open.is_empty()
     }
 
-    /// A node answered.
+    /// Records an answer from a node.
     pub(super) fn on_answer(&mut self, node: NodeId) {
         self.answered.insert(node);
         self.boot_times.remove(&node);
         self.end(node);
     }
 
-    /// A transfer of a node has ended. Returns the facts that explain a missing answer.
+    /// Ends the open request of a node. Returns the facts that explain a missing answer.
     pub(super) fn end(&mut self, node: NodeId) -> MissedAnswer {
         self.repeated.remove(&node);
         let frame = self.open.remove(&node).and_then(|(_, frame)| frame);
@@ -125,7 +125,7 @@ impl MissedAnswers {
     /// Handles a frame on the SDO channel of a node, if the frame is not part of our transfer.
     pub(super) fn on_channel(&mut self, node: NodeId, frame: &Frame, now: Mono) {
         if frame.id().sdo_request_node().is_some() {
-            // Another master uses the channel: the frames may be its answers.
+            // Another master uses the channel: the frames may be answers to that master.
             self.open.remove(&node);
             self.foreign_requests.extend(object_of(frame).map(|object| (node, object)));
         } else if let Some((_, candidate)) = self.open.get_mut(&node) {
@@ -135,7 +135,7 @@ impl MissedAnswers {
         }
     }
 
-    /// A frame with another COB-ID.
+    /// Handles a frame with another COB-ID.
     pub(super) fn on_other_cob_id(&mut self, frame: &Frame, now: Mono) {
         if let Some((node, life)) = Life::parse(frame) {
             match life {
@@ -159,7 +159,7 @@ impl MissedAnswers {
     }
 }
 
-/// The object in the first frame of a transfer.
+/// Returns the object in the first frame of a transfer.
 fn object_of(frame: &Frame) -> Option<ObjectId> {
     let [_, a, b, c, _, _, _, _] = *frame.data() else { return None };
     Some(ObjectId::from_multiplexer([a, b, c]))

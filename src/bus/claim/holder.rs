@@ -1,8 +1,8 @@
-//! Which process holds a name in the abstract namespace.
+//! Finds the process that holds a name in the abstract namespace.
 //!
 //! The kernel reports the peer of a connection. The connection is non-blocking, so a holder that does not accept, or
-//! whose queue is full, cannot block this process. In that case the holder is searched in `/proc`, which shows sockets
-//! of other users only to root.
+//! whose queue is full, cannot block this process. In that case `/proc` is searched, which shows the sockets of other
+//! users only to root.
 
 use super::Holder;
 use socket2::{Domain, SockAddr, Socket, Type};
@@ -36,7 +36,7 @@ pub(super) fn identify(address: &SocketAddr) -> Holder {
     }
 }
 
-/// The process that listens at this name, by a connection that does not block.
+/// Reads the credentials of the process that listens at this name, over a non-blocking connection.
 #[expect(unsafe_code, reason = "the standard library does not give the credentials of a peer")]
 fn peer(name: &[u8]) -> io::Result<libc::ucred> {
     let socket = Socket::new(Domain::UNIX, Type::STREAM.nonblocking().cloexec(), None)?;
@@ -53,7 +53,7 @@ fn peer(name: &[u8]) -> io::Result<libc::ucred> {
     if result == 0 { Ok(peer) } else { Err(io::Error::last_os_error()) }
 }
 
-/// The process that has the socket of this name open, from `/proc`.
+/// Searches `/proc` for the process that has the socket of this name open.
 fn owner(name: &[u8]) -> Option<u32> {
     let sockets = fs::read("/proc/self/net/unix").ok()?;
     let ending = [b" @", name].concat();
@@ -71,7 +71,7 @@ fn owner(name: &[u8]) -> Option<u32> {
     })
 }
 
-/// The name of a user, from `/etc/passwd`.
+/// Looks up the name of a user ID in `/etc/passwd`.
 fn user_name(user: u32) -> Option<String> {
     let users = fs::read_to_string("/etc/passwd").ok()?;
     users.lines().find_map(|line| {
@@ -81,7 +81,7 @@ fn user_name(user: u32) -> Option<String> {
     })
 }
 
-/// Replaces control characters. A process chooses its name, which must not control a terminal.
+/// Replaces all but printable ASCII characters, so that the name of a process cannot control the terminal.
 fn printable(text: &str) -> String {
     let safe = |character: char| if character.is_ascii_graphic() || character == ' ' { character } else { '?' };
     text.chars().take(MAX_NAME).map(safe).collect()

@@ -1,8 +1,8 @@
 //! Claims as Unix sockets in the abstract namespace.
 //!
-//! Two rules keep processes apart. A process that claims single nodes binds their names and then checks that "every
-//! node" is free. A process that claims every node binds that name and then checks each node. If two processes do this
-//! at the same time, at least one detects the other. The process with single nodes then releases them and waits.
+//! Two rules keep processes apart. A process that claims single nodes binds their names and then checks that the name
+//! for every node is free. A process that claims every node binds this name and then checks each node. If two processes
+//! claim at the same time, at least one detects the other. The process with single nodes then releases them and waits.
 
 use super::holder::identify;
 use super::{Claim, ClaimError, Holder, IfHeld, Part};
@@ -24,20 +24,19 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(20);
 /// More nodes than this are claimed as every node. Each name needs a file descriptor.
 const MAX_SINGLE_NODES: usize = 16;
 
-/// The claims of this process, until the value is dropped or the process ends.
+/// The claims of this process. They are released when the value is dropped or the process ends.
 #[derive(Debug, Default)]
 pub struct Claims {
     #[cfg_attr(not(test), expect(dead_code, reason = "a name is held while its socket is open"))]
     listeners: Arc<[UnixListener]>,
-    /// The thread ends when this end is closed.
+    /// Closing this socket ends the `drain` thread.
     stop: Option<UnixStream>,
     drain: Option<JoinHandle<()>>,
 }
 
 impl Claims {
-    /// Claims the parts of `claim` on the interface `name`. An interface may have several names (altname): its claims
-    /// are the same under each of them. `report` is called for the first wait longer than half a second, and for each
-    /// holder that is ignored.
+    /// Claims the parts of `claim` on the interface `name`. All names of an interface (altname) share its claims.
+    /// `report` is called once if the wait is longer than half a second, and for each holder that is ignored.
     ///
     /// # Errors
     /// [`ClaimError::InUse`] after the waiting time; an interrupt; a failure of the system. If the system does not
@@ -137,17 +136,17 @@ struct Attempt<'a> {
     key: String,
     if_held: IfHeld,
     started: Instant,
-    /// Set from the first wait on. Before, Ctrl-C ends the program by itself.
+    /// Set at the first wait. Until then, Ctrl-C ends the program directly.
     interrupts: Option<Interrupts>,
     is_reported: bool,
-    /// The holder of this part, identified only once.
+    /// The last part that was in use, and its holder, so that the holder is identified only once.
     holder: Option<(Part, Holder)>,
     report: &'a mut dyn FnMut(&ClaimError),
     held: Vec<UnixListener>,
 }
 
 impl Attempt<'_> {
-    /// Claims all parts, and waits for each. `false` if all parts were released and the attempt must be repeated.
+    /// Claims all parts, and waits for parts in use. Returns `false` if all parts were released: then try again.
     fn take_all(&mut self, parts: &[Part]) -> Result<bool, ClaimError> {
         for &part in parts {
             loop {
@@ -213,10 +212,10 @@ impl Attempt<'_> {
         Ok(matches!(self.bind(part)?, Bound::InUse))
     }
 
-    /// Waits a short time for the holder of a part. `false` if the command continues in spite of the holder.
+    /// Waits a short time for the holder of a part. Returns `false` if the command continues in spite of the holder.
     fn wait_for(&mut self, part: Part) -> Result<bool, ClaimError> {
         let holder = match self.holder.take() {
-            Some((of, holder)) if of == part && holder.process.is_some() => holder,
+            Some((held_part, holder)) if held_part == part && holder.process.is_some() => holder,
             _ => self.address(part).map(|address| identify(&address)).unwrap_or_default(),
         };
         self.holder = Some((part, holder.clone()));

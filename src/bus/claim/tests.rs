@@ -1,4 +1,4 @@
-//! Claims of several holders in one process, and of programs that do not follow the rules.
+//! Tests with several holders in one process, and with programs that do not follow the rules.
 
 use super::*;
 use socket2::{Domain, SockAddr, Socket, Type};
@@ -24,7 +24,7 @@ fn address(bus: &str, part: &str) -> SocketAddr {
     SocketAddr::from_abstract_name(format!("cangauge/{bus}/{part}")).expect("a short name")
 }
 
-/// This process, as a holder.
+/// The text that describes this process as a holder.
 fn this_process() -> String {
     let user = std::fs::read_to_string("/proc/self/status").expect("procfs");
     let user = user.lines().find_map(|line| line.strip_prefix("Uid:")?.split_ascii_whitespace().next()).unwrap();

@@ -24,7 +24,7 @@ pub trait Sleeper: Send {
     fn sleep(&mut self, length: Duration) -> bool;
 }
 
-/// Ctrl-C and SIGTERM.
+/// Waits that end on Ctrl-C and SIGTERM.
 impl Sleeper for Interrupts {
     fn sleep(&mut self, length: Duration) -> bool {
         if length.is_zero() { self.take() } else { self.wait_for(length) }
@@ -44,8 +44,8 @@ impl Sleeper for Uninterrupted {
     }
 }
 
-/// The time lines of a bus. Both start when the bus is opened and run in parallel, so that intervals are equal on
-/// both.
+/// The monotonic time and the wall time of a bus. Both start when the bus is opened and advance together, so that
+/// intervals are equal on both.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TimeLine {
     Real { opened: Instant, epoch: Wall },

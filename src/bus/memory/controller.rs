@@ -6,14 +6,14 @@ use crate::bus::time::Mono;
 use crate::canopen::wire_length::bit_time;
 use std::time::Duration;
 
-/// The wait of an error-passive controller before a retry. A real controller waits a few bit times. With this longer
-/// wait, a frame without acknowledgement causes fewer errors in hours of virtual time.
+/// The wait of an error-passive controller before a retry. It is longer than in a real controller (a few bit times), to
+/// limit the number of retries in hours of virtual time.
 pub(super) const PASSIVE_PAUSE: Duration = Duration::from_millis(10);
 
-const WARNING: u16 = 96;
-const PASSIVE: u16 = 128;
-const OFF: u16 = 256;
-/// The end of bus-off: 128 times 11 recessive bits.
+const WARNING_LIMIT: u16 = 96;
+const PASSIVE_LIMIT: u16 = 128;
+const BUS_OFF_LIMIT: u16 = 256;
+/// The length of bus-off: 128 times 11 recessive bits.
 const RECOVERY_BITS: u32 = 128 * 11;
 
 /// The outcome of a transmission.
@@ -32,7 +32,7 @@ pub(super) enum Outcome {
 pub(super) struct Controller {
     transmit_errors: u16,
     receive_errors: u16,
-    /// The end of bus-off, or of the wait for a retry.
+    /// The time at which bus-off or the wait for a retry ends.
     pub(super) waits_until: Option<Mono>,
 }
 
@@ -60,9 +60,9 @@ impl Level {
 impl Controller {
     pub(super) fn level(&self) -> Level {
         match self.transmit_errors.max(self.receive_errors) {
-            _ if self.transmit_errors >= OFF => Level::Off,
-            PASSIVE.. => Level::Passive,
-            WARNING.. => Level::Warning,
+            _ if self.transmit_errors >= BUS_OFF_LIMIT => Level::Off,
+            PASSIVE_LIMIT.. => Level::Passive,
+            WARNING_LIMIT.. => Level::Warning,
             _ => Level::Active,
         }
     }
@@ -85,9 +85,9 @@ impl Controller {
     pub(super) fn received(&mut self, valid: bool) {
         if valid {
             // One valid frame ends error-passive (ISO 11898-1: "between 119 and 127").
-            self.receive_errors = self.receive_errors.min(PASSIVE).saturating_sub(1);
+            self.receive_errors = self.receive_errors.min(PASSIVE_LIMIT).saturating_sub(1);
         } else {
-            self.receive_errors = (self.receive_errors + 1).min(OFF - 1);
+            self.receive_errors = (self.receive_errors + 1).min(BUS_OFF_LIMIT - 1);
         }
     }
 

@@ -25,11 +25,11 @@ pub const QUEUE_LENGTH: usize = 10;
 /// The default bit rate in bit/s.
 pub const BIT_RATE: u32 = 250_000;
 
-/// A simulated CAN bus, from the side of the program.
+/// A simulated CAN bus, and the connection of the program to it.
 ///
 /// The program is one station. As on SocketCAN, it receives the frames of other stations, but not its own. All events
-/// are processed in [`Bus::receive`] and [`Bus::send`]; there is no thread. On the real clock, events that were due in
-/// the meantime are processed later, each with its own time.
+/// are processed in [`Bus::receive`] and [`Bus::send`]; there is no thread. With the real clock, events that became due
+/// between two calls are processed in the next call, each with its own time.
 ///
 /// Each station has a bit rate. A frame is delivered if a station with the same bit rate acknowledges it and no station
 /// destroys it. A station at a different bit rate receives only errors, and destroys frames until it is error-passive.
@@ -40,8 +40,8 @@ pub struct MemoryBus {
     name: String,
     bit_rate: u32,
     mode: Mode,
-    /// Bit rate and mode before the program changed them.
-    before: Option<(u32, Mode)>,
+    /// The bit rate and mode from before the program changed them.
+    original_rate: Option<(u32, Mode)>,
     /// Whether the program may change the bit rate.
     can_retime: bool,
     queue_length: usize,
@@ -87,7 +87,7 @@ impl MemoryBus {
             name: "sim".to_owned(),
             bit_rate: BIT_RATE,
             mode: Mode::Normal,
-            before: None,
+            original_rate: None,
             can_retime: true,
             queue_length: QUEUE_LENGTH,
             time_line: TimeLine::open(clock),
@@ -172,7 +172,7 @@ impl MemoryBus {
         self.interrupts.insert(moment);
     }
 
-    /// The time of the next event, not before the present time.
+    /// Returns the time of the next event, or the present time if the event is overdue.
     fn next_event_time(&self) -> Option<Mono> {
         let wire = match &self.wire {
             Wire::Busy(transmission) => Some(transmission.complete),
@@ -187,8 +187,8 @@ impl MemoryBus {
         next.map(|moment| moment.max(self.now))
     }
 
-    /// Processes the next event up to `limit`, and stops when the program has an event to receive. `true` if there may
-    /// be more.
+    /// Processes the next event if it happens no later than `limit`. Returns `false` if there was no such event:
+    /// then the time does not advance.
     fn step(&mut self, limit: Mono) -> bool {
         let Some(moment) = self.next_event_time().filter(|moment| *moment <= limit) else { return false };
         self.now = moment;
@@ -197,8 +197,8 @@ impl MemoryBus {
             self.inbox.push_back(Event::Interrupted);
             return true;
         }
-        // A complete frame is delivered before stations wake. All stations that wake at this moment take part in the
-        // arbitration.
+        // A complete frame is delivered before stations wake. All stations that wake at the same moment take part in
+        // the next arbitration.
         if let Wire::Busy(transmission) = &self.wire
             && transmission.complete <= moment
         {
@@ -249,7 +249,7 @@ impl BitRateControl for MemoryBus {
     fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
         self.can_set_bit_rate()?;
         self.catch_up();
-        self.before.get_or_insert((self.bit_rate, self.mode));
+        self.original_rate.get_or_insert((self.bit_rate, self.mode));
         self.queue.clear();
         self.inbox.retain(|event| *event == Event::Interrupted);
         if let Wire::Busy(transmission) = &mut self.wire {
@@ -269,9 +269,9 @@ impl BitRateControl for MemoryBus {
     }
 
     fn restore_bit_rate(&mut self) -> Result<(), BusError> {
-        let Some((bit_rate, mode)) = self.before else { return Ok(()) };
+        let Some((bit_rate, mode)) = self.original_rate else { return Ok(()) };
         self.set_bit_rate(bit_rate, mode)?;
-        self.before = None;
+        self.original_rate = None;
         Ok(())
     }
 }
@@ -294,7 +294,7 @@ impl Bus for MemoryBus {
     }
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        // The old filters apply to frames that were complete before.
+        // The old filters still apply to frames that are already complete.
         self.catch_up();
         self.filters = filters.clone();
         Ok(())

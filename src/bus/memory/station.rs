@@ -10,21 +10,21 @@ use std::collections::VecDeque;
 /// A station never waits and has no clock: the caller passes the time. `Any` allows a test to inspect an attached
 /// station.
 pub trait Station: Any + Send {
-    /// The power is switched on at `now`.
+    /// Starts the device: the power is switched on at `now`.
     fn power_on(&mut self, now: Mono, out: &mut Outbox);
 
-    /// A frame of another station was received at `now`.
+    /// Handles a frame of another station, received at `now`.
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox);
 
-    /// The moment of [`Station::next_wake`] was reached.
+    /// Does what is due at `now`, the moment of [`Station::next_wake`].
     fn wake(&mut self, now: Mono, out: &mut Outbox);
 
-    /// When the station must be woken next. After [`Station::wake`] at `now`, this must be later than `now`; otherwise
+    /// Returns when the station must be woken next. After [`Station::wake`] at `now`, this must be later than `now`; otherwise
     /// time would stop. The value may change only in the other functions of this trait, or through
     /// [`super::MemoryBus::stations_mut`].
     fn next_wake(&self) -> Option<Mono>;
 
-    /// A frame of this station was sent completely at `now`.
+    /// Handles the end of a transmission: the frame of this station was sent completely at `now`.
     fn sent(&mut self, now: Mono, frame: &Frame);
 
     /// The bit rate of the station.
@@ -32,8 +32,8 @@ pub trait Station: Any + Send {
         Tuning::Follows
     }
 
-    /// Passes the bit rate of the bus in bit/s: before [`Station::power_on`], and when the program changes the bit
-    /// rate.
+    /// Receives the bit rate of the bus in bit/s. Called before [`Station::power_on`], and when the program changes
+    /// the bit rate.
     fn on_bus_bit_rate(&mut self, _bit_rate: u32) {}
 }
 
@@ -60,7 +60,7 @@ impl Outbox {
         self.frames.push_back(frame);
     }
 
-    /// Returns a frame that has to be sent again.
+    /// Puts a failed frame back to the front, because it must be sent again.
     pub(super) fn put_back(&mut self, frame: Frame) {
         self.frames.push_front(frame);
     }

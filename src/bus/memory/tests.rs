@@ -52,9 +52,9 @@ fn length(text: &str) -> Duration {
     Duration::from_micros(u64::from(frame_bits(&frame(text))) * 4)
 }
 
-const PAUSE: Duration = Duration::from_micros(12);
+const INTERMISSION_TIME: Duration = Duration::from_micros(12);
 
-/// All frames up to `until`, each with its time in microseconds.
+/// Receives all frames up to `until`, each with its time in microseconds.
 fn drain(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
     let mut seen = Vec::new();
     loop {
@@ -105,10 +105,10 @@ fn the_lowest_identifier_wins_and_no_frame_is_interrupted() {
     // Each frame starts when the intermission after the previous one is over.
     let sent: Vec<Mono> = bus.stations::<Script>().flat_map(|station| station.sent.iter().map(|(at, _)| *at)).collect();
     let first = Mono::START + length("7FF#");
-    let second = first + PAUSE + length("081#01");
-    let third = second + PAUSE + length("182#02");
-    let fourth = third + PAUSE + length("06080000#");
-    let fifth = fourth + PAUSE + length("000#0100");
+    let second = first + INTERMISSION_TIME + length("081#01");
+    let third = second + INTERMISSION_TIME + length("182#02");
+    let fourth = third + INTERMISSION_TIME + length("06080000#");
+    let fifth = fourth + INTERMISSION_TIME + length("000#0100");
     assert_eq!(sent, [first, second, fourth, fifth, third]);
 }
 

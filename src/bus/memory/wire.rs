@@ -42,11 +42,11 @@ impl Transmission {
 }
 
 impl MemoryBus {
-    /// All stations with a frame to send: earliest start, sender, frame.
+    /// Returns the earliest start, the sender and the frame for each sender that has a frame to send.
     pub(super) fn contenders(&self) -> impl Iterator<Item = (Mono, Sender, Frame)> {
         let ready = |controller: &Controller| controller.waits_until.unwrap_or(Mono::START);
-        let is_out = self.mode == Mode::ListenOnly || self.controller.level() == Level::Off;
-        let program = self.queue.front().filter(|_| !is_out);
+        let cannot_send = self.mode == Mode::ListenOnly || self.controller.level() == Level::Off;
+        let program = self.queue.front().filter(|_| !cannot_send);
         let program = program.map(|frame| (ready(&self.controller), Sender::Program, *frame));
         let stations = self.places.iter().enumerate().filter_map(move |(index, place)| {
             let frame = *place.out.front()?;
@@ -95,7 +95,7 @@ impl MemoryBus {
             Tuning::At(rate) => Some(rate == bit_rate),
             Tuning::Off => None,
         };
-        // For each station that does not send: whether it receives at this bit rate or disturbs the frame.
+        // For each station that does not send: `true` if it receives at this bit rate, `false` if it disturbs the frame.
         let receiving: Vec<Option<bool>> = self
             .places
             .iter()

@@ -19,20 +19,20 @@ impl Default for MinuteClock {
 }
 
 impl MinuteClock {
-    /// The time since the first reading.
+    /// Returns the time from the first reading to `reading`, which was received at `now`.
     pub(super) fn continued(&mut self, reading: u16, now: Mono) -> Duration {
         let reading = u32::from(reading);
         if reading >= self.period {
-            // The clock of some firmware restarts after 16 bits.
+            // In some firmware the clock restarts only after 65 536 ms (16 bits).
             *self = MinuteClock { period: 0x1_0000, last: None };
         }
         let time = match self.last {
             None => Duration::ZERO,
-            Some((before, at, time)) => {
+            Some((last_reading, received_at, time)) => {
                 let period = Duration::from_millis(u64::from(self.period));
-                let step = Duration::from_millis(u64::from((reading + self.period - before) % self.period));
+                let step = Duration::from_millis(u64::from((reading + self.period - last_reading) % self.period));
                 // A frame may arrive up to half a minute late, so the number of minutes is rounded.
-                let minutes = (now.since(at) + period / 2).saturating_sub(step).as_nanos() / period.as_nanos();
+                let minutes = (now.since(received_at) + period / 2).saturating_sub(step).as_nanos() / period.as_nanos();
                 time + step + period * u32::try_from(minutes).unwrap_or(u32::MAX)
             }
         };

@@ -1,4 +1,4 @@
-//! The features of an adapter, from its answers to `V`, `v` and `N`.
+//! Detects the features of an adapter from its answers to `V`, `v` and `N`.
 
 use std::fmt;
 
@@ -16,7 +16,7 @@ pub(super) struct Firmware {
 /// The kinds of firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// LAWICEL CAN232 and CANUSB do not answer `v`. USBtin answers all three commands.
+    /// LAWICEL CAN232 and CANUSB, which do not answer `v`, and USBtin, which answers all three commands.
     Lawicel,
     /// CANable and similar adapters (normaldotcom/canable-fw).
     Canable,
@@ -24,7 +24,7 @@ enum Kind {
     Unknown,
 }
 
-/// The command for a bit rate.
+/// The command that sets a bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rate {
     /// `S5`.
@@ -34,7 +34,8 @@ pub(super) enum Rate {
 }
 
 impl Rate {
-    /// The registers for a bit rate that the clock divides into, to 0.05 %. About 16 time quanta, sampled at about 85 %.
+    /// Returns the registers for a bit rate; `None` if the clock cannot generate it to 0.05 %. A bit has about 16 time
+    /// quanta, and is sampled at about 85 %.
     fn registers(bit_rate: u32) -> Option<Rate> {
         const CLOCK: u32 = 8_000_000;
         let divisor = (CLOCK + bit_rate / 2).checked_div(bit_rate).filter(|&divisor| divisor > 0)?;
@@ -58,7 +59,7 @@ impl fmt::Display for Rate {
     }
 }
 
-/// The command for opening the channel without acknowledgements.
+/// The command that opens the channel without sending acknowledgements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ListenOnly {
     /// `L` instead of `O`.
@@ -88,10 +89,10 @@ impl Firmware {
         }
     }
 
-    /// The command for a bit rate: a digit after `S`, or the registers of the controller. `S7` and `S9` mean different
+    /// Returns the command for a bit rate: a digit after `S`, or the registers of the controller. `S7` and `S9` mean different
     /// rates in different firmware.
     pub(super) fn rate(&self, bit_rate: u32) -> Option<Rate> {
-        // CAN232 and CANUSB have an SJA1000. The registers of USBtin are others.
+        // CAN232 and CANUSB have an SJA1000. USBtin has other registers.
         let has_registers = self.kind() == Kind::Lawicel && self.detail.is_none();
         let registers = || Rate::registers(bit_rate).filter(|_| has_registers);
         self.rate_digit(bit_rate).map(Rate::Digit).or_else(registers)

@@ -1,8 +1,8 @@
 //! Serial adapters with the LAWICEL protocol (slcan): CANable, CANtact, USBtin, CAN232, WiFi bridges.
 //!
-//! The adapters differ. Some answer each command, and some answer none. Some need two seconds after opening. Many lose
-//! commands that arrive before the previous answer, so the next command waits for the answer. For an adapter that does
-//! not answer, frames are paced to the bit rate.
+//! The adapters differ. Some answer each command, and some answer none. Some start two seconds after the port is opened. Many lose
+//! commands that arrive before the previous answer, so the next command waits for the answer. To an adapter that
+//! does not answer, frames are sent no faster than the bit rate allows.
 
 mod clock;
 mod firmware;
@@ -22,7 +22,7 @@ pub(super) use text::{Lines, command};
 
 /// The longest wait for the first answer. Some adapters restart when the port is opened.
 const WAKE_TIMEOUT: Duration = Duration::from_millis(2500);
-/// The interval of attempts to get a first answer.
+/// The interval between attempts to get a first answer.
 const WAKE_INTERVAL: Duration = Duration::from_millis(250);
 /// After the first answer, answers to earlier attempts may follow within this time.
 const QUIET_TIME: Duration = Duration::from_millis(60);
@@ -30,13 +30,13 @@ const QUIET_TIME: Duration = Duration::from_millis(60);
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(300);
 /// The time between commands to an adapter that does not answer.
 const UNANSWERED_COMMAND_INTERVAL: Duration = Duration::from_millis(30);
-/// The interval of attempts to send a rejected frame.
+/// The interval between attempts to send a rejected frame.
 const RETRY_INTERVAL: Duration = Duration::from_millis(5);
 /// A frame is dropped after this number of rejections.
 const MAX_TRIES: u32 = 40;
-/// Frames that wait for the adapter.
+/// The largest number of frames that wait for the adapter.
 const MAX_QUEUED: usize = 64;
-/// The interval of reads of the error flags.
+/// The interval at which the error flags are read.
 const FLAGS_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A step of the set-up of the adapter.
@@ -49,7 +49,7 @@ enum Step {
     /// Checks whether the adapter supports the requested channel.
     Decide,
     Rate(Rate),
-    Stamps,
+    Timestamps,
     Silent(bool),
     Open,
     Listen,
@@ -65,7 +65,7 @@ impl Step {
             Step::Serial => "N".to_owned(),
             Step::Decide => String::new(),
             Step::Rate(rate) => rate.to_string(),
-            Step::Stamps => "Z1".to_owned(),
+            Step::Timestamps => "Z1".to_owned(),
             Step::Silent(on) => format!("M{}", u8::from(on)),
             Step::Open => "O".to_owned(),
             Step::Listen => "L".to_owned(),
@@ -109,10 +109,10 @@ pub(super) struct Slcan {
     lines: Lines,
     firmware: Firmware,
     /// Whether the adapter answers commands.
-    answers: bool,
+    answers_commands: bool,
     /// Whether the adapter answers frames; `None` if still unknown.
     answers_frames: Option<bool>,
-    has_stamps: bool,
+    has_timestamps: bool,
     /// The error flags, if the adapter reports them.
     flags: Option<u8>,
     queue: VecDeque<Frame>,
@@ -125,7 +125,7 @@ pub(super) struct Slcan {
 }
 
 impl Slcan {
-    /// `mode`: `None` leaves the channel closed.
+    /// Creates the host side. If `mode` is `None`, the channel stays closed.
     pub(super) fn new(bit_rate: u32, mode: Option<Mode>) -> Slcan {
         Slcan {
             channel: mode.map(|mode| (bit_rate, mode)),
@@ -138,9 +138,9 @@ impl Slcan {
             next_flags: Mono::START,
             lines: Lines::default(),
             firmware: Firmware::default(),
-            answers: false,
+            answers_commands: false,
             answers_frames: None,
-            has_stamps: false,
+            has_timestamps: false,
             flags: None,
             queue: VecDeque::new(),
             tries: 0,
@@ -151,8 +151,8 @@ impl Slcan {
         }
     }
 
-    /// The commands that open the channel, or the reason why this is not possible.
-    fn opening(&self) -> Result<Vec<Step>, String> {
+    /// Returns the commands that open the channel, or the reason why this is not possible.
+    fn opening_steps(&self) -> Result<Vec<Step>, String> {
         let Some((bit_rate, mode)) = self.channel else { return Ok(Vec::new()) };
         let rate = self.firmware.rate(bit_rate).ok_or_else(|| {
             let adapter = &self.firmware;
@@ -161,7 +161,7 @@ impl Slcan {
                  250k, 500k, 1M)"
             )
         })?;
-        let mut steps = vec![Step::Rate(rate), Step::Stamps];
+        let mut steps = vec![Step::Rate(rate), Step::Timestamps];
         let listen_only = self.firmware.listen_only();
         if listen_only == Some(ListenOnly::SilentMode) {
             steps.push(Step::Silent(mode == Mode::ListenOnly));
@@ -177,12 +177,12 @@ impl Slcan {
         Ok(steps)
     }
 
-    /// Starts the commands after the first answer, or without one.
+    /// Starts the set-up commands after the first answer, or after the time-out if there is none.
     fn set_up(&mut self) {
         self.stage = Stage::Working;
         self.due = None;
         let questions = [Step::Version, Step::Detail, Step::Serial];
-        self.steps = questions.into_iter().filter(|_| self.answers).chain([Step::Decide]).collect();
+        self.steps = questions.into_iter().filter(|_| self.answers_commands).chain([Step::Decide]).collect();
     }
 
     /// Handles the answer to a step; `None` after the time-out.
@@ -196,7 +196,7 @@ impl Slcan {
             Step::Version => self.firmware.version = text,
             Step::Detail => self.firmware.detail = text,
             Step::Serial => self.firmware.serial = text,
-            Step::Stamps => self.has_stamps = answer == Some(Answer::Done),
+            Step::Timestamps => self.has_timestamps = answer == Some(Answer::Done),
             Step::Flags => self.flags = text.as_deref().and_then(flags),
             Step::Rate(_) | Step::Open | Step::Listen | Step::Silent(_) if is_rejected => {
                 let what = match (step, self.channel) {
@@ -222,7 +222,7 @@ impl Slcan {
             self.due = None;
             if let Some(step) = self.steps.pop_front() {
                 if step == Step::Decide {
-                    self.steps = self.opening()?.into();
+                    self.steps = self.opening_steps()?.into();
                     continue;
                 }
                 if step == Step::Flags {
@@ -230,7 +230,8 @@ impl Slcan {
                 }
                 self.pending = Some(Pending::Step(step));
                 self.write(&step.command(), out);
-                self.due = Some(now.mono + if self.answers { ANSWER_TIMEOUT } else { UNANSWERED_COMMAND_INTERVAL });
+                self.due =
+                    Some(now.mono + if self.answers_commands { ANSWER_TIMEOUT } else { UNANSWERED_COMMAND_INTERVAL });
             } else if self.flags.is_some() && self.next_flags <= now.mono {
                 self.steps.push_back(Step::Flags);
             } else if let Some(frame) = self.queue.front().copied() {
@@ -246,7 +247,7 @@ impl Slcan {
                     self.not_before = now.mono + pace;
                 } else {
                     self.pending = Some(Pending::Frame);
-                    self.due = Some(now.mono + if self.answers { ANSWER_TIMEOUT } else { pace });
+                    self.due = Some(now.mono + if self.answers_commands { ANSWER_TIMEOUT } else { pace });
                 }
             } else {
                 self.is_retiming = false;
@@ -283,7 +284,7 @@ impl Slcan {
             Answer::Garbage if self.is_open() => out.events.push_back(Event::Fault(Fault::Garbled, now)),
             Answer::Garbage => {}
             _ if self.stage != Stage::Working => {
-                self.answers = true;
+                self.answers_commands = true;
                 self.stage = Stage::Settling;
                 self.due = Some(now.mono + QUIET_TIME);
             }
@@ -321,7 +322,7 @@ impl Slcan {
         }
     }
 
-    /// Reports the error flags of a read: errors at each read, states of the controller only when they begin.
+    /// Reports the error flags that were read: errors after each read, controller states only if they are new.
     fn report_flags(&mut self, before: Option<u8>, now: Stamp, out: &mut Output) {
         let Some(flags) = self.flags else { return };
         let new = flags & !before.unwrap_or(0);
@@ -364,8 +365,8 @@ impl Protocol for Slcan {
         });
         self.lines = lines;
         result?;
-        // Some firmware answers with more than one character. So the next command is sent after all received
-        // characters.
+        // Some firmware answers with more than one character. So the next command is sent only after all received
+        // characters are processed.
         self.advance(now, out)
     }
 
@@ -422,7 +423,7 @@ impl Protocol for Slcan {
     }
 
     fn timestamps(&self) -> TimestampSource {
-        if self.has_stamps { TimestampSource::Hardware } else { TimestampSource::Program }
+        if self.has_timestamps { TimestampSource::Hardware } else { TimestampSource::Program }
     }
 
     fn bit_rate(&self) -> Option<u32> {
@@ -430,7 +431,7 @@ impl Protocol for Slcan {
     }
 
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
-        if self.answers {
+        if self.answers_commands {
             return Ok(());
         }
         Err(BusError::Unsupported("this adapter confirms nothing, so its bit rate cannot be set safely".to_owned()))
@@ -439,7 +440,7 @@ impl Protocol for Slcan {
     fn set_channel(&mut self, to: Option<(u32, Mode)>, now: Stamp, out: &mut Output) -> Result<(), BusError> {
         self.can_set_bit_rate()?;
         let before = std::mem::replace(&mut self.channel, to);
-        let opening = self.opening().map_err(|why| match to {
+        let opening = self.opening_steps().map_err(|why| match to {
             Some((_, Mode::ListenOnly)) if self.firmware.listen_only().is_none() => BusError::Unsupported(why),
             _ => {
                 let bit_rate = to.map_or(self.bit_rate, |(bit_rate, _)| bit_rate);

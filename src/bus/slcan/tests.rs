@@ -10,7 +10,7 @@ fn at(mono: Duration) -> Stamp {
 struct Adapter {
     /// Whether the adapter never answers.
     is_silent: bool,
-    /// The end of each answer.
+    /// The characters at the end of each answer.
     end: &'static str,
     /// Input before this moment is ignored.
     starts_at: Duration,
@@ -269,7 +269,7 @@ fn unplugged_adapter_is_found_again() {
     use std::os::fd::AsRawFd;
     let folder = tempfile::tempdir().expect("a folder");
     let link = folder.path().join("adapter");
-    // Plugs an adapter in, which runs until it is dropped.
+    // Connects a simulated adapter. It is unplugged when the second value is dropped.
     let plug = |link: std::path::PathBuf| {
         let (host, device) = SerialPort::pair().expect("a pseudo terminal");
         let name = std::fs::read_link(format!("/proc/self/fd/{}", device.as_raw_fd())).expect("a name");

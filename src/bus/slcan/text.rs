@@ -3,10 +3,10 @@
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 
-/// The longest line: an extended frame with eight bytes and a time stamp. Answers to `V` can be longer.
+/// The longest line that is accepted. A frame has at most 30 characters, but an answer to `V` can have more.
 const MAX_LINE: usize = 128;
 
-/// A message of an adapter.
+/// A message from an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::bus) enum Answer {
     /// `\r`, `z\r` or `Z\r`: the command was executed.
@@ -22,13 +22,13 @@ pub(in crate::bus) enum Answer {
 }
 
 impl Answer {
-    /// The frame, if it is one.
+    /// Returns the frame, if the message is one.
     pub(in crate::bus) fn frame(self) -> Option<Frame> {
         if let Answer::Frame(frame, _) = self { Some(frame) } else { None }
     }
 }
 
-/// Finds lines in a stream of bytes that arrive in pieces.
+/// Splits a byte stream into lines. The bytes may arrive in pieces.
 #[derive(Debug, Default)]
 pub(in crate::bus) struct Lines {
     line: Vec<u8>,
@@ -43,7 +43,7 @@ impl Lines {
                 b'\r' => {
                     let line = std::mem::take(&mut self.line);
                     let is_garbage = std::mem::take(&mut self.is_garbage);
-                    found(if is_garbage { Answer::Garbage } else { answer(&line) });
+                    found(if is_garbage { Answer::Garbage } else { parse_line(&line) });
                 }
                 0x07 => {
                     if std::mem::take(&mut self.is_garbage) || !self.line.is_empty() {
@@ -61,21 +61,21 @@ impl Lines {
     }
 }
 
-fn answer(line: &[u8]) -> Answer {
+fn parse_line(line: &[u8]) -> Answer {
     // Only printable characters were kept.
     let text = String::from_utf8_lossy(line);
     match line.first() {
         None => Answer::Done,
         Some(b'z' | b'Z') if line.len() == 1 => Answer::Done,
         Some(b't' | b'T' | b'r' | b'R') => {
-            frame(&text).map_or(Answer::Garbage, |(frame, time)| Answer::Frame(frame, time))
+            parse_frame(&text).map_or(Answer::Garbage, |(frame, time)| Answer::Frame(frame, time))
         }
         Some(_) => Answer::Text(text.into_owned()),
     }
 }
 
-/// `t1A4300AABB` or `T0000018A300AABB`, remote `r7011`, each with four more digits of time if the adapter sends it.
-fn frame(line: &str) -> Option<(Frame, Option<u16>)> {
+/// Parses `t1A4300AABB`, `T0000018A300AABB` or remote `r7011`. Each can end with four digits of time.
+fn parse_frame(line: &str) -> Option<(Frame, Option<u16>)> {
     let kind = line.get(..1)?;
     let rest = line.get(1..).filter(|rest| rest.bytes().all(|byte| byte.is_ascii_hexdigit()))?;
     let (id, rest) = rest.split_at_checked(if matches!(kind, "t" | "r") { 3 } else { 8 })?;
@@ -100,7 +100,7 @@ fn frame(line: &str) -> Option<(Frame, Option<u16>)> {
     Some((Frame::new(id, &bytes.collect::<Option<Vec<u8>>>()?).ok()?, time))
 }
 
-/// The command that sends a frame.
+/// Returns the command that sends a frame.
 pub(in crate::bus) fn command(frame: &Frame) -> String {
     let is_extended = matches!(frame.id(), CanId::Extended(_));
     let kind = match (is_extended, frame.is_remote()) {

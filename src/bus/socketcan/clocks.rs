@@ -4,10 +4,10 @@ use crate::bus::{Mono, Stamp, Wall};
 use std::time::Duration;
 
 /// The time for which a comparison of the clocks is valid. The clocks drift apart by less than 1 ms in this time.
-const COMPARE_EVERY: Duration = Duration::from_secs(1);
+const COMPARE_INTERVAL: Duration = Duration::from_secs(1);
 /// The longest time between two readings for a good comparison.
 const MAX_READING_GAP: Duration = Duration::from_micros(100);
-/// The inaccuracy caused by successive readings and drift.
+/// The inaccuracy of a comparison, because the clocks are read one after the other and drift.
 const JITTER: Duration = Duration::from_millis(1);
 
 /// The kernel timestamps frames with the wall clock only. Deadlines and intervals need the monotonic time. So the
@@ -37,10 +37,10 @@ impl Clocks {
         self.read = now;
     }
 
-    /// The receive time of a frame of the current batch. `now` reads both clocks.
+    /// Returns the receive time of a frame of the current batch. `now` reads both clocks.
     pub(super) fn stamp(&mut self, kernel: Option<Duration>, now: &dyn Fn() -> Stamp) -> Stamp {
         let start = match self.compared {
-            Some((at, start)) if self.read.since(at) < COMPARE_EVERY => start,
+            Some((at, start)) if self.read.since(at) < COMPARE_INTERVAL => start,
             _ => self.compare(now),
         };
         let Some(wall) = kernel else {
@@ -59,7 +59,7 @@ impl Clocks {
 
     fn compare(&mut self, now: &dyn Fn() -> Stamp) -> Duration {
         // The wall clock is read between two readings of the other clock. If these are far apart, the program was
-        // interrupted, and the next try is better.
+        // interrupted, and the clocks are read again.
         let mut first = now();
         let mut best = (first, Duration::MAX);
         for _ in 0..4 {
@@ -79,7 +79,7 @@ impl Clocks {
         start
     }
 
-    /// The monotonic time for `wall`, if a frame of this batch can have that time.
+    /// Returns the monotonic time for `wall`, if a frame of this batch can have that time.
     fn place(&self, wall: Duration, start: Duration) -> Option<Mono> {
         let mono = Mono::at(wall.checked_sub(start)?);
         let possible = mono + JITTER >= self.empty_at && mono <= self.read + JITTER;
@@ -102,12 +102,12 @@ mod tests {
     struct Computer {
         mono: Cell<u64>,
         wall: Cell<u64>,
-        looks: Cell<u32>,
+        reading_count: Cell<u32>,
     }
 
     impl Computer {
         fn new() -> Computer {
-            Computer { mono: Cell::new(0), wall: Cell::new(OPENED), looks: Cell::new(0) }
+            Computer { mono: Cell::new(0), wall: Cell::new(OPENED), reading_count: Cell::new(0) }
         }
 
         fn pass(&self, millis: u64) {
@@ -117,7 +117,7 @@ mod tests {
 
         fn stamp(&self, clocks: &mut Clocks, wall: u64) -> Mono {
             let now = || {
-                self.looks.set(self.looks.get() + 1);
+                self.reading_count.set(self.reading_count.get() + 1);
                 Stamp { mono: mono(self.mono.get()), wall: Wall::at(Duration::from_millis(self.wall.get())) }
             };
             let stamp = clocks.stamp(Some(Duration::from_millis(wall)), &now);
@@ -136,11 +136,11 @@ mod tests {
         computer.pass(500);
         clocks.batch(mono(600), true);
         assert_eq!(computer.stamp(&mut clocks, OPENED + 599), mono(599));
-        assert_eq!(computer.looks.get(), 2);
+        assert_eq!(computer.reading_count.get(), 2);
         computer.pass(700);
         clocks.batch(mono(1300), true);
         assert_eq!(computer.stamp(&mut clocks, OPENED + 1200), mono(1200));
-        assert_eq!(computer.looks.get(), 4);
+        assert_eq!(computer.reading_count.get(), 4);
     }
 
     #[test]
@@ -176,7 +176,7 @@ mod tests {
             assert_eq!(computer.stamp(&mut clocks, after), mono(112), "{step}");
             assert!((mono(100)..=mono(112)).contains(&computer.stamp(&mut clocks, before)), "{step}");
             assert_eq!(computer.stamp(&mut clocks, after), mono(112), "{step}");
-            assert!(computer.looks.get() <= 6);
+            assert!(computer.reading_count.get() <= 6);
         }
     }
 

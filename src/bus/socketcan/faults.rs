@@ -4,7 +4,7 @@ use crate::bus::Fault;
 use socketcan::CanErrorFrame;
 use socketcan::errors::{ControllerProblems, ErrorCause, Location};
 
-/// The faults in an error frame, each once. Lost arbitration and error counters are not faults.
+/// Returns the faults in an error frame, each once. Lost arbitration and error counters are not faults.
 pub(super) fn faults(frame: CanErrorFrame) -> Vec<Fault> {
     let mut found = Vec::new();
     let mut add = |fault| {
@@ -50,35 +50,35 @@ pub(super) fn faults(frame: CanErrorFrame) -> Vec<Fault> {
 mod tests {
     use super::*;
 
-    /// The faults of an error frame given as its classes and data.
-    fn of(classes: u32, data: [u8; 8]) -> Vec<Fault> {
+    /// Returns the faults of an error frame with these classes and data.
+    fn faults_in(classes: u32, data: [u8; 8]) -> Vec<Fault> {
         faults(CanErrorFrame::new_error(classes, &data).unwrap())
     }
 
     #[test]
     fn error_frames_of_drivers_are_converted() {
-        // Classes and data as in linux/can/error.h; the combinations are those of sja1000 and gs_usb.
-        assert_eq!(of(0x040, [0; 8]), [Fault::BusOff]);
-        assert_eq!(of(0x100, [0; 8]), [Fault::Restarted]);
-        assert_eq!(of(0x020, [0; 8]), [Fault::NoAcknowledge]);
-        assert_eq!(of(0x001, [0; 8]), [Fault::TransmitTimeout]);
-        assert_eq!(of(0x204, [0, 0x0c, 0, 0, 0, 0, 96, 100]), [Fault::ErrorWarning]);
-        assert_eq!(of(0x204, [0, 0x24, 0, 0, 0, 0, 128, 96]), [Fault::ErrorPassive]);
-        assert_eq!(of(0x204, [0, 0x40, 0, 0, 0, 0, 1, 0]), [Fault::ErrorActive]);
-        assert_eq!(of(0x004, [0, 0x01, 0, 0, 0, 0, 0, 0]), [Fault::ControllerOverflow]);
-        assert_eq!(of(0x088, [0, 0, 0x04, 0x0a, 0, 0, 0, 0]), [Fault::Protocol]);
-        assert_eq!(of(0x088, [0, 0, 0x80, 0x19, 0, 0, 0, 0]), [Fault::NoAcknowledge]);
-        assert_eq!(of(0x0a8, [0, 0, 0, 0x19, 0, 0, 0, 0]), [Fault::NoAcknowledge]);
-        assert_eq!(of(0x080, [0; 8]), [Fault::Protocol]);
-        assert_eq!(of(0x010, [0, 0, 0, 0, 0x04, 0, 0, 0]), [Fault::Transceiver]);
-        assert_eq!(of(0x044, [0, 0x30, 0, 0, 0, 0, 0, 0]), [Fault::ErrorPassive, Fault::BusOff]);
+        // Classes and data as in linux/can/error.h; the combinations come from the drivers sja1000 and gs_usb.
+        assert_eq!(faults_in(0x040, [0; 8]), [Fault::BusOff]);
+        assert_eq!(faults_in(0x100, [0; 8]), [Fault::Restarted]);
+        assert_eq!(faults_in(0x020, [0; 8]), [Fault::NoAcknowledge]);
+        assert_eq!(faults_in(0x001, [0; 8]), [Fault::TransmitTimeout]);
+        assert_eq!(faults_in(0x204, [0, 0x0c, 0, 0, 0, 0, 96, 100]), [Fault::ErrorWarning]);
+        assert_eq!(faults_in(0x204, [0, 0x24, 0, 0, 0, 0, 128, 96]), [Fault::ErrorPassive]);
+        assert_eq!(faults_in(0x204, [0, 0x40, 0, 0, 0, 0, 1, 0]), [Fault::ErrorActive]);
+        assert_eq!(faults_in(0x004, [0, 0x01, 0, 0, 0, 0, 0, 0]), [Fault::ControllerOverflow]);
+        assert_eq!(faults_in(0x088, [0, 0, 0x04, 0x0a, 0, 0, 0, 0]), [Fault::Protocol]);
+        assert_eq!(faults_in(0x088, [0, 0, 0x80, 0x19, 0, 0, 0, 0]), [Fault::NoAcknowledge]);
+        assert_eq!(faults_in(0x0a8, [0, 0, 0, 0x19, 0, 0, 0, 0]), [Fault::NoAcknowledge]);
+        assert_eq!(faults_in(0x080, [0; 8]), [Fault::Protocol]);
+        assert_eq!(faults_in(0x010, [0, 0, 0, 0, 0x04, 0, 0, 0]), [Fault::Transceiver]);
+        assert_eq!(faults_in(0x044, [0, 0x30, 0, 0, 0, 0, 0, 0]), [Fault::ErrorPassive, Fault::BusOff]);
     }
 
     #[test]
     fn harmless_and_unknown_classes_are_handled() {
-        assert_eq!(of(0x002, [5, 0, 0, 0, 0, 0, 0, 0]), []);
-        assert_eq!(of(0x200, [0, 0, 0, 0, 0, 0, 7, 7]), []);
-        assert_eq!(of(0, [0; 8]), [Fault::Other]);
-        assert_eq!(of(0x0800_0000, [0; 8]), [Fault::Other]);
+        assert_eq!(faults_in(0x002, [5, 0, 0, 0, 0, 0, 0, 0]), []);
+        assert_eq!(faults_in(0x200, [0, 0, 0, 0, 0, 0, 7, 7]), []);
+        assert_eq!(faults_in(0, [0; 8]), [Fault::Other]);
+        assert_eq!(faults_in(0x0800_0000, [0; 8]), [Fault::Other]);
     }
 }

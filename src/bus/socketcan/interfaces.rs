@@ -3,16 +3,16 @@
 use std::fs;
 use std::path::Path;
 
-const NET: &str = "/sys/class/net";
+const SYSFS_NET: &str = "/sys/class/net";
 /// `ARPHRD_CAN`, the hardware type of CAN interfaces.
 const CAN_HARDWARE: &str = "280";
-/// `IFF_UP`: switched on by the administrator.
+/// `IFF_UP`: the flag of an interface that is up.
 const UP: u32 = 1;
 
 /// A CAN interface of this host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Interface {
-    /// Its name, for example `can0`.
+    /// The name, for example `can0`.
     pub name: String,
     /// Whether it is up.
     pub up: bool,
@@ -20,14 +20,14 @@ pub struct Interface {
     pub driver: Option<String>,
 }
 
-/// The CAN interfaces of this host, sorted by name. Empty without sysfs.
+/// Lists the CAN interfaces of this host, sorted by name. Empty if there is no sysfs.
 pub fn interfaces() -> Vec<Interface> {
-    interfaces_in(Path::new(NET))
+    interfaces_in(Path::new(SYSFS_NET))
 }
 
 /// Whether the interface is up; `None` if sysfs does not report it.
 pub(super) fn is_up(name: &str) -> Option<bool> {
-    up_in(&Path::new(NET).join(name))
+    read_is_up(&Path::new(SYSFS_NET).join(name))
 }
 
 fn interfaces_in(net: &Path) -> Vec<Interface> {
@@ -39,7 +39,7 @@ fn interfaces_in(net: &Path) -> Vec<Interface> {
             let driver = fs::read_link(entry.path().join("device/driver")).ok();
             Some(Interface {
                 name: entry.file_name().into_string().ok()?,
-                up: up_in(&entry.path()).unwrap_or(false),
+                up: read_is_up(&entry.path()).unwrap_or(false),
                 driver: driver.and_then(|link| Some(link.file_name()?.to_str()?.to_owned())),
             })
         })
@@ -49,7 +49,7 @@ fn interfaces_in(net: &Path) -> Vec<Interface> {
     found
 }
 
-fn up_in(interface: &Path) -> Option<bool> {
+fn read_is_up(interface: &Path) -> Option<bool> {
     let flags = fs::read_to_string(interface.join("flags")).ok()?;
     let flags = u32::from_str_radix(flags.trim().strip_prefix("0x")?, 16).ok()?;
     Some(flags & UP != 0)

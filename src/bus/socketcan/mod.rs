@@ -33,8 +33,8 @@ use std::io;
 use std::os::fd::AsFd;
 use std::time::{Duration, Instant};
 
-/// The interval of checks whether an interface is up again. The kernel does not report it.
-const LINK_CHECK: Duration = Duration::from_millis(200);
+/// The interval at which an interface is checked for being up again, because the kernel does not report it.
+const LINK_CHECK_INTERVAL: Duration = Duration::from_millis(200);
 /// The first wait after a send. It does not read the clock or check for signals. An answer within this time costs one
 /// system call instead of four.
 const ANSWER_TIME: Duration = Duration::from_millis(10);
@@ -75,7 +75,7 @@ pub struct SocketCan {
     /// The bit rate, and whether the interface only listens. Read once while it stays up, because this takes several
     /// system calls.
     controller: Cell<Option<(Option<u32>, bool)>>,
-    /// The interface before its bit rate was set.
+    /// The settings of the interface before its bit rate was set.
     original_link: Option<Link>,
 }
 
@@ -154,17 +154,17 @@ impl SocketCan {
         }
     }
 
-    /// Runs `work`, which may set the interface down and up without an [`Event::Link`]. `work` calls its second
+    /// Runs `work`, which may set the interface down and up. This causes no [`Event::Link`]. `work` calls its second
     /// argument to discard the frames received so far.
     fn reset<T>(&mut self, work: impl FnOnce(&str, &mut dyn FnMut()) -> Result<T, BusError>) -> Result<T, BusError> {
         let (batch, ready, socket) = (&mut self.batch, &mut self.ready, self.socket.as_fd());
         let result = work(&self.name, &mut || {
             ready.clear();
-            // Read all frames first, then the error "interface is down", which comes only once.
+            // Read twice, because one loop ends at the error "interface is down", which is reported only once.
             while batch.fill(socket, false).is_ok() {}
             while batch.fill(socket, false).is_ok() {}
         });
-        // If the bit rate is not supported, the interface may have gone down once more.
+        // Clears the error of the socket: if the bit rate is not supported, the interface may have gone down again.
         let _ = self.socket.as_raw_socket().take_error();
         self.is_drained = false;
         self.controller.set(None);
@@ -178,7 +178,7 @@ impl SocketCan {
     }
 
     /// Reads the frames that the kernel holds for this socket.
-    /// With `wait`, it waits up to [`ANSWER_TIME`] for the first one.
+    /// If `wait` is set, waits up to [`ANSWER_TIME`] for the first frame.
     fn fill(&mut self, wait: bool) -> Result<(), BusError> {
         match self.batch.fill(self.socket.as_fd(), wait) {
             Ok(count) => {
@@ -214,7 +214,7 @@ impl SocketCan {
     /// Waits for a frame, a signal or the deadline. Returns whether the deadline was reached without an event.
     fn wait(&mut self, deadline: Mono) -> Result<bool, BusError> {
         let left = deadline.since(self.mono());
-        let limit = if self.is_up { left } else { left.min(LINK_CHECK) };
+        let limit = if self.is_up { left } else { left.min(LINK_CHECK_INTERVAL) };
         // A socket without an interface receives nothing.
         let ready = if self.is_removed {
             poll::readable([self.interrupts.fd()], limit).map(|[signal]| [false, signal])
@@ -228,7 +228,7 @@ impl SocketCan {
         if frames {
             self.is_drained = false;
         } else if self.is_removed {
-            self.find_again()?;
+            self.reopen()?;
         } else if self.is_back() {
             self.set_is_up(true);
         }
@@ -243,8 +243,8 @@ impl SocketCan {
     /// The bit rate, and whether the interface only listens.
     fn controller(&self) -> (Option<u32>, bool) {
         self.controller.get().unwrap_or_else(|| {
-            let of = |link: Link| (link.bit_rate(), link.listen_only == Some(true));
-            let found = netlink::get(&self.name).map_or((None, false), of);
+            let settings = |link: Link| (link.bit_rate(), link.listen_only == Some(true));
+            let found = netlink::get(&self.name).map_or((None, false), settings);
             self.controller.set(Some(found));
             found
         })
@@ -259,7 +259,7 @@ impl SocketCan {
     ///
     /// # Errors
     /// The interface exists but cannot be opened.
-    fn find_again(&mut self) -> Result<(), BusError> {
+    fn reopen(&mut self) -> Result<(), BusError> {
         let bound = match socket::bind(&self.name, &self.filters, ANSWER_TIME) {
             Ok(bound) => bound,
             // The interface is not ready yet: it is created, renamed and set up in steps.
@@ -285,15 +285,15 @@ impl SocketCan {
         Ok(())
     }
 
-    /// Processes a message. Returns its frame if no other event comes first; otherwise all events are queued in order.
+    /// Processes a message. Returns the frame if no other event precedes it; otherwise queues all events in order.
     fn process(&mut self, message: Message) -> Option<Event> {
-        // A received frame may show that the interface is up, earlier than the next check. Old frames, queued before
-        // the interface went down, also arrive here. So the state is checked.
+        // A frame may be the first sign that the interface is up again. But old frames, queued before the interface
+        // went down, also arrive here. So the state is checked.
         if self.is_back() {
             self.set_is_up(true);
         }
         if let Some(lost) = message.lost {
-            // The count at the time when this frame was queued. Later drops may already be reported.
+            // `lost` is the count when this frame was queued. Later drops may already be reported.
             let more = lost.wrapping_sub(self.reported_drops);
             if more > 0 && more <= u32::MAX / 2 {
                 self.reported_drops = lost;
@@ -393,13 +393,13 @@ impl Bus for SocketCan {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        // The driver would discard the frame without an error.
+        // In listen-only mode, the driver would discard the frame without an error.
         if self.controller().1 {
             return Err(BusError::ListenOnly(self.name.clone()));
         }
         self.expected_answers = ANSWERS;
         self.socket.write_frame(&to_kernel(frame)).map_err(|error| {
-            // The kernel reports this once, to the first call.
+            // The kernel reports these errors only once, to the first call.
             match error.raw_os_error() {
                 Some(libc::ENETDOWN) => self.set_is_up(false),
                 Some(libc::ENODEV | libc::ENXIO) => self.lose_interface(),
@@ -438,8 +438,8 @@ impl Bus for SocketCan {
     }
 }
 
-/// The name under which the kernel lists the interface `name`, which may be one of its further names (altname).
-/// `None` if there is no such interface.
+/// Returns the primary name of an interface, given this name or another of its names (altname). `None` if there is no
+/// such interface.
 pub(super) fn primary_name(name: &str) -> Option<String> {
     netlink::get(name).ok().map(|link| link.name).filter(|name| !name.is_empty())
 }
@@ -462,7 +462,7 @@ fn to_kernel(frame: &Frame) -> CanFrame {
     CanFrame::from(raw)
 }
 
-/// `None` if it is not a classic data or remote frame.
+/// Returns `None` if `raw` is not a classic data or remote frame.
 fn from_kernel(raw: &libc::can_frame) -> Option<Frame> {
     let id = if raw.can_id & libc::CAN_EFF_FLAG != 0 {
         CanId::extended(raw.can_id & libc::CAN_EFF_MASK)?

@@ -13,7 +13,7 @@ pub(super) const BATCH: usize = VECTOR as usize;
 /// The size for the control messages of one frame in bytes: two timestamps and a counter take 120.
 const CONTROL: usize = 128;
 
-/// Has the alignment of the kernel's control message header.
+/// A buffer with the alignment of the kernel's control message header.
 #[repr(C, align(8))]
 #[derive(Clone, Copy)]
 struct Control([u8; CONTROL]);
@@ -23,7 +23,7 @@ struct Control([u8; CONTROL]);
 struct Slot {
     frame: libc::can_frame,
     control: Control,
-    /// The number of bytes that the kernel wrote to `frame`, and below to `control`.
+    /// The numbers of bytes that the kernel wrote to `frame` and to `control`.
     filled: usize,
     control_filled: usize,
 }
@@ -35,7 +35,7 @@ pub(super) struct Message {
     pub(super) frame: libc::can_frame,
     /// When the kernel received it, as time since 1970.
     pub(super) wall: Option<Duration>,
-    /// When the interface received it, by its own clock.
+    /// When the interface received it, on the clock of the interface.
     pub(super) own: Option<Duration>,
     /// The total number of frames lost by this socket when this frame was queued.
     pub(super) lost: Option<u32>,
@@ -55,7 +55,7 @@ impl Batch {
         Batch { slots: Box::new([empty; BATCH]), next: 0, count: 0 }
     }
 
-    /// The next frame of the batch.
+    /// Returns the next frame of the batch.
     pub(super) fn next(&mut self) -> Option<Message> {
         while self.next < self.count {
             let slot = &self.slots[self.next];
@@ -69,8 +69,8 @@ impl Batch {
         None
     }
 
-    /// Reads all waiting frames, up to [`BATCH`], and returns their number, which is never 0. With `wait` it waits for
-    /// the first frame up to the socket's `SO_RCVTIMEO`.
+    /// Reads all waiting frames, up to [`BATCH`], and returns their number, which is never 0. If `wait` is
+    /// set, waits up to the socket's `SO_RCVTIMEO` for the first frame.
     ///
     /// # Errors
     /// No frame is waiting, or the socket failed.
@@ -113,8 +113,8 @@ struct ControlInfo {
     lost: Option<u32>,
 }
 
-/// Parses timestamps and drop counter from the control messages of one frame. Each message has a header: a length of
-/// type `size_t` that includes the header, level, type. It starts at a multiple of the size of `size_t`.
+/// Parses timestamps and drop counter from the control messages of one frame. Each message has a header with a
+/// length (`size_t`, includes the header), a level and a type. It starts at a multiple of the size of `size_t`.
 fn parse_control(mut control: &[u8]) -> ControlInfo {
     const WORD: usize = size_of::<usize>();
     let mut info = ControlInfo::default();
@@ -126,7 +126,7 @@ fn parse_control(mut control: &[u8]) -> ControlInfo {
         if i32::from_ne_bytes(*level) == libc::SOL_SOCKET {
             match i32::from_ne_bytes(*kind) {
                 libc::SCM_TIMESTAMPNS => info.wall = read_timespec(data),
-                // Three times: of the kernel, an unused one, and of the hardware. The last is 0 if there is none.
+                // Three times: the kernel time, an unused time, and the hardware time, which is 0 if there is none.
                 libc::SCM_TIMESTAMPING => {
                     let own = data.get(data.len() / 3 * 2..).and_then(read_timespec);
                     info.own = own.filter(|own| !own.is_zero());

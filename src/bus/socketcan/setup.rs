@@ -1,22 +1,22 @@
-//! Switches interfaces on and off and sets their bit rates. Other settings stay unchanged. A failed change is undone,
-//! and each result is read back.
+//! Switches interfaces on and off and sets their bit rates. Other settings stay unchanged. Each change
+//! is checked by reading the state back, and undone if it failed.
 
 use super::netlink::{self, BitTiming, Link, Refusal};
 use crate::bus::{BusError, Mode};
 use std::fs;
 
-/// `CAP_NET_ADMIN`, the right to set interfaces.
+/// The number of `CAP_NET_ADMIN`, the privilege to configure interfaces.
 const NET_ADMIN: u32 = 12;
-/// The accepted deviation of the actual bit rate, in parts per thousand. Both sides of a bus share a tolerance of about
-/// 1 %.
-const TOLERANCE: u64 = 5;
+/// The accepted deviation of the actual bit rate, in parts per thousand. The bit rates of two nodes may differ by
+/// about 1 % in total.
+const TOLERANCE_PER_MILLE: u64 = 5;
 
 /// A change of an interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Change {
-    /// The interface before.
+    /// The interface before the change.
     pub before: Link,
-    /// The interface now; equal to `before` if there was nothing to do.
+    /// The interface after the change; equal to `before` if there was nothing to do.
     pub after: Link,
 }
 
@@ -29,7 +29,7 @@ pub fn link(name: &str) -> Result<Link, BusError> {
     if link.is_can { Ok(link) } else { Err(BusError::NotCan(name.to_owned())) }
 }
 
-/// Switches an interface on. With a bit rate, it also sets bit rate and mode; an interface that is up then goes down
+/// Switches an interface on. If `bit_rate` is given, also sets bit rate and mode: an interface that is up then goes down
 /// for a moment.
 ///
 /// # Errors
@@ -38,7 +38,7 @@ pub fn bring_up(name: &str, bit_rate: Option<u32>, mode: Mode) -> Result<Change,
     let before = link(name)?;
     let after = match bit_rate {
         Some(bit_rate) => {
-            is_possible(name, &before, bit_rate)?;
+            check_possible(name, &before, bit_rate)?;
             if before.up
                 && before.bit_rate().is_some_and(|now| is_near(now, bit_rate))
                 && listens_only(&before) == (mode == Mode::ListenOnly)
@@ -69,7 +69,7 @@ pub fn bring_down(name: &str) -> Result<Change, BusError> {
 /// # Errors
 /// The interface is not a controller, or the privilege is missing.
 pub(super) fn can_set_bit_rate(name: &str) -> Result<(), BusError> {
-    is_controller(name, &link(name)?)?;
+    check_controller(name, &link(name)?)?;
     // If the privilege is unknown, the kernel decides later.
     if fs::read_to_string("/proc/self/status").is_ok_and(|status| has_net_admin(&status) == Some(false)) {
         return Err(BusError::Permission(format!("set the bit rate of {name}")));
@@ -80,7 +80,7 @@ pub(super) fn can_set_bit_rate(name: &str) -> Result<(), BusError> {
 /// Sets bit rate and mode of an interface and switches it on. `while_down` is called while the interface is down.
 ///
 /// # Errors
-/// The kernel rejects the change. The interface is then restored; if not, the error reports it.
+/// The kernel rejects the change. The interface is then restored; if this also fails, the error reports it.
 pub(super) fn retime(
     name: &str,
     before: &Link,
@@ -88,10 +88,10 @@ pub(super) fn retime(
     mode: Mode,
     while_down: &mut dyn FnMut(),
 ) -> Result<Link, BusError> {
-    is_possible(name, before, bit_rate)?;
+    check_possible(name, before, bit_rate)?;
     let listens = mode == Mode::ListenOnly;
     if listens && before.can_listen_only == Some(false) {
-        return Err(no_listening(name));
+        return Err(listen_only_unsupported(name));
     }
     // The mode is not set on a controller that does not support it.
     let listen_only = (listens || before.listen_only.is_some()).then_some(listens);
@@ -110,13 +110,17 @@ pub(super) fn retime(
             return Err(BusError::BitRate { name: name.to_owned(), bit_rate, why });
         }
         if listens_only(&now) != listens {
-            return Err(if listens { no_listening(name) } else { unchanged(name, "it is still in listen-only mode") });
+            return Err(if listens {
+                listen_only_unsupported(name)
+            } else {
+                unchanged(name, "it is still in listen-only mode")
+            });
         }
         Ok(now)
     };
     work(while_down).map_err(|error| match restore(name, before, &mut || ()) {
         Ok(()) => error,
-        Err(worse) => not_restored(error, &worse),
+        Err(restore_error) => not_restored(error, &restore_error),
     })
 }
 
@@ -161,11 +165,11 @@ fn switch(name: &str, link: &Link, up: bool) -> Result<Link, BusError> {
 
 /// Whether an actual bit rate is close enough to the requested bit rate.
 fn is_near(actual: u32, bit_rate: u32) -> bool {
-    u64::from(actual.abs_diff(bit_rate)) * 1000 <= u64::from(bit_rate) * TOLERANCE
+    u64::from(actual.abs_diff(bit_rate)) * 1000 <= u64::from(bit_rate) * TOLERANCE_PER_MILLE
 }
 
-fn is_possible(name: &str, link: &Link, bit_rate: u32) -> Result<(), BusError> {
-    is_controller(name, link)?;
+fn check_possible(name: &str, link: &Link, bit_rate: u32) -> Result<(), BusError> {
+    check_controller(name, link)?;
     let why = match &link.fixed_rates {
         Some(rates) if !rates.is_empty() && !rates.contains(&bit_rate) => {
             let rates: Vec<String> = rates.iter().map(u32::to_string).collect();
@@ -179,7 +183,7 @@ fn is_possible(name: &str, link: &Link, bit_rate: u32) -> Result<(), BusError> {
     Err(BusError::BitRate { name: name.to_owned(), bit_rate, why })
 }
 
-fn is_controller(name: &str, link: &Link) -> Result<(), BusError> {
+fn check_controller(name: &str, link: &Link) -> Result<(), BusError> {
     if link.is_controller() {
         return Ok(());
     }
@@ -193,7 +197,7 @@ fn listens_only(link: &Link) -> bool {
     link.listen_only.unwrap_or(false)
 }
 
-fn no_listening(name: &str) -> BusError {
+fn listen_only_unsupported(name: &str) -> BusError {
     BusError::Unsupported(format!("{name} has no listen-only mode: its driver does not support it"))
 }
 
@@ -209,15 +213,15 @@ fn explain(refusal: Refusal, doing: &str, name: &str, bit_rate: u32, listens: bo
             let why = refusal.words.unwrap_or_else(|| refusal.error.to_string());
             BusError::BitRate { name: name.to_owned(), bit_rate, why }
         }
-        Some(libc::EOPNOTSUPP) if listens => no_listening(name),
+        Some(libc::EOPNOTSUPP) if listens => listen_only_unsupported(name),
         _ => refusal.into_error(doing, name),
     }
 }
 
 /// Combines an error with a second one that occurred while restoring.
-fn not_restored(error: BusError, worse: &BusError) -> BusError {
+fn not_restored(error: BusError, restore_error: &BusError) -> BusError {
     let what = format!("{error}; the former state could not be restored");
-    BusError::Io { what, source: std::io::Error::other(worse.to_string()) }
+    BusError::Io { what, source: std::io::Error::other(restore_error.to_string()) }
 }
 
 /// Whether a process may configure interfaces, according to its `/proc/PID/status`.

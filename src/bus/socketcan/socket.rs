@@ -19,12 +19,12 @@ pub(super) struct Bound {
     pub(super) socket: CanSocket,
     /// The identifiers to deliver, if they are too many for the kernel.
     pub(super) wanted: Option<BTreeSet<CanId>>,
-    /// The timestamp source, until the interface delivers its own.
+    /// The timestamp source, until the interface delivers hardware times.
     pub(super) timestamps: TimestampSource,
 }
 
-/// Opens a socket on the interface `name` that blocks for at most `limit`. If the interface is down, this is the error
-/// of the socket.
+/// Opens a socket on the interface `name`. Reads block for at most `limit`. If the interface is down, `bind` succeeds,
+/// and `take_error` of the socket returns `ENETDOWN`.
 pub(super) fn bind(name: &str, filters: &Filters, limit: Duration) -> Result<Bound, BusError> {
     let socket = new(limit)?;
     let failed = |what: &str, source| BusError::Io { what: format!("{what} {name}"), source };
@@ -83,7 +83,7 @@ pub(super) fn set_filters(socket: &CanSocket, filters: &Filters) -> io::Result<O
     socket.set_filters(&filters).map(|()| None)
 }
 
-/// The filter for data frames and remote frames with exactly this identifier.
+/// Returns the filter for data frames and remote frames with exactly this identifier.
 fn filter(id: CanId) -> (u32, u32) {
     match id {
         CanId::Standard(id) => (u32::from(id), libc::CAN_SFF_MASK | libc::CAN_EFF_FLAG),
@@ -91,14 +91,14 @@ fn filter(id: CanId) -> (u32, u32) {
     }
 }
 
-/// The size of the receive buffer, and the requested size.
+/// Returns the size of the receive buffer, and the requested size.
 pub(super) fn receive_buffer(socket: &CanSocket) -> Option<ReceiveBuffer> {
     let bytes = socket.as_raw_socket().recv_buffer_size().ok()?;
     Some(ReceiveBuffer { bytes, wanted: usize::try_from(RECEIVE_BUFFER).ok()? * 2 })
 }
 
-/// The kernel's present count of frames lost by this socket. The count that comes with a frame is older. `None` before
-/// Linux 4.12.
+/// Returns the kernel's present count of frames lost by this socket. The count that comes with a frame is older. `None`
+/// before Linux 4.12.
 pub(super) fn lost(socket: &CanSocket) -> Option<u32> {
     // The last value of `SO_MEMINFO` (`SK_MEMINFO_DROPS`).
     const DROPS: usize = 8;

@@ -22,7 +22,7 @@ fn open_client() -> Client {
     client
 }
 
-/// The events of text that arrives in these pieces.
+/// Returns the events for text that arrives in these pieces.
 fn events<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> Vec<String> {
     let (mut client, mut out) = (open_client(), Output::default());
     for piece in pieces {
@@ -102,7 +102,7 @@ fn time_of_the_server_is_an_offset() {
     }
 }
 
-/// A server that runs `serve` with its first connection, and its name as a bus.
+/// Starts a server that runs `serve` for its first connection. Returns the bus and the thread.
 fn server(serve: impl FnOnce(TcpStream, TcpListener) + Send + 'static) -> (Remote, thread::JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("bound");
     let address = listener.local_addr().expect("an address");
@@ -119,7 +119,7 @@ fn address(server: &Server) -> SocketAddr {
 }
 
 /// Reads up to the end of a message.
-fn hear(stream: &mut TcpStream) -> String {
+fn read_message(stream: &mut TcpStream) -> String {
     let (mut text, mut byte) = (String::new(), [0]);
     while !text.ends_with('>') {
         stream.read_exact(&mut byte).expect("a message");
@@ -131,9 +131,9 @@ fn hear(stream: &mut TcpStream) -> String {
 /// Greets and opens the bus.
 fn greet(stream: &mut TcpStream) {
     stream.write_all(b"< hi >").expect("written");
-    assert_eq!(hear(stream), "< open can0 >");
+    assert_eq!(read_message(stream), "< open can0 >");
     stream.write_all(b"< ok >").expect("written");
-    assert_eq!(hear(stream), "< rawmode >");
+    assert_eq!(read_message(stream), "< rawmode >");
     stream.write_all(b"< ok >").expect("written");
 }
 
@@ -145,7 +145,7 @@ fn error(remote: &Remote) -> String {
 fn refusals_are_reported_in_words() {
     let (bus, thread) = server(|mut stream, _| {
         stream.write_all(b"< hi >").expect("written");
-        hear(&mut stream);
+        read_message(&mut stream);
         stream.write_all(b"< error could not \x1b open bus >").expect("written");
         let _ = stream.read(&mut [0; 9]);
     });
@@ -169,7 +169,7 @@ fn refusals_are_reported_in_words() {
 fn lost_connection_is_made_again() {
     let (bus, thread) = server(|mut stream, listener| {
         greet(&mut stream);
-        assert_eq!(hear(&mut stream), "< send 605 8 40 0 10 0 0 0 0 0 >");
+        assert_eq!(read_message(&mut stream), "< send 605 8 40 0 10 0 0 0 0 0 >");
         stream.write_all(b"< frame 585 5.000000 43001000940").expect("written");
         drop(stream);
         let mut stream = listener.accept().expect("a client again").0;
@@ -259,10 +259,10 @@ fn our_server_survives_odd_clients() {
     let address = address(&server);
     let client = thread::spawn(move || {
         let mut stream = TcpStream::connect(address).expect("connected");
-        assert_eq!(hear(&mut stream), "< hi >");
+        assert_eq!(read_message(&mut stream), "< hi >");
         let mut answer = |text: &str| {
             stream.write_all(text.as_bytes()).expect("written");
-            hear(&mut stream)
+            read_message(&mut stream)
         };
         assert_eq!(answer("< rawmode >"), "< error unknown command >");
         assert_eq!(answer("GET / HTTP/1.0\r\n\r\n< open vcan7 >"), "< ok >");

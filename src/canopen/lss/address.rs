@@ -1,4 +1,4 @@
-//! LSS addresses and ranges of them.
+//! LSS addresses, and ranges of LSS addresses.
 
 use super::{Limit, Part, Request};
 use crate::canopen::id::parse_u32;
@@ -46,7 +46,7 @@ pub enum LssAddressError {
 }
 
 impl LssAddress {
-    /// The address with these four numbers, in the order of [`Part::ALL`].
+    /// Creates an address from four numbers, in the order of [`Part::ALL`].
     pub fn new([vendor, product, revision, serial]: [u32; 4]) -> LssAddress {
         LssAddress { vendor, product, revision, serial }
     }
@@ -61,13 +61,13 @@ impl LssAddress {
         self.parts()[usize::from(part.number())]
     }
 
-    /// The frames that select the slave with this address, in order.
+    /// Returns the requests that select the slave with this address, in order.
     pub fn selection(&self) -> [Request; 4] {
         Part::ALL.map(|part| Request::Select(part, self.part(part)))
     }
 
-    /// Two ranges of the same vendor and product: all lower and all higher serial numbers, in all revisions. `None` if
-    /// no lower or no higher number exists.
+    /// Returns two ranges of the same vendor and product: all lower and all higher serial numbers, in all revisions.
+    /// `None` if no lower or no higher number exists.
     pub fn neighbours(&self) -> [Option<LssRange>; 2] {
         let range = |serial| LssRange { vendor: self.vendor, product: self.product, revision: (0, u32::MAX), serial };
         [
@@ -76,7 +76,7 @@ impl LssAddress {
         ]
     }
 
-    /// Two ranges of the same vendor, product and serial number: all lower and all higher revisions.
+    /// Returns two ranges of the same vendor, product and serial number: all lower and all higher revisions.
     pub fn revisions(&self) -> [Option<LssRange>; 2] {
         let range = |revision| LssRange { revision, ..LssRange::from(*self) };
         [
@@ -87,7 +87,7 @@ impl LssAddress {
 }
 
 impl LssRange {
-    /// The frames of the identify request, in order.
+    /// Returns the frames of the identify request, in order.
     pub fn identification(&self) -> [Request; 6] {
         Limit::ALL.map(|limit| {
             let number = match limit {

@@ -21,7 +21,7 @@ impl ErrorCode {
         self.code == 0
     }
 
-    /// The meaning of the code for this service in CiA 305.
+    /// Returns the meaning of the code for this service, if CiA 305 defines it.
     pub fn meaning(self, service: Service) -> Option<&'static str> {
         Some(match (service, self.code) {
             (_, 0) => "done",
@@ -34,7 +34,7 @@ impl ErrorCode {
         })
     }
 
-    /// The code as text: `error 1, node-ID out of range`, `error 255, manufacturer-specific error: 3`.
+    /// Describes the code: `error 1, node-ID out of range`, `error 255, manufacturer-specific error: 3`.
     pub fn describe(self, service: Service) -> impl fmt::Display {
         Description { code: self, service }
     }

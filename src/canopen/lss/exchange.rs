@@ -3,8 +3,8 @@
 use super::{Answer, ErrorCode, LssAddress, LssRange, Request, Service, Violation};
 use crate::canopen::frame::Frame;
 
-/// The number of different answers that are kept.
-const KEPT: usize = 128;
+/// The largest number of different answers that are stored.
+const MAX_ANSWERS: usize = 128;
 
 /// A service in progress. All slaves in configuration state answer, so the exchange collects answers until the caller
 /// ends it.
@@ -14,10 +14,10 @@ pub struct Exchange {
     service: Service,
     /// The different answers in the order of arrival.
     received: Vec<(Frame, Result<Answer, Violation>)>,
-    /// The number of answers, repeated ones included.
-    count: usize,
+    /// The number of answers, including repeated ones.
+    answer_count: usize,
     /// The number of requests.
-    asked: usize,
+    request_count: usize,
 }
 
 /// Why a service with one slave failed.
@@ -34,17 +34,23 @@ pub enum ExchangeError {
 }
 
 impl Exchange {
-    /// A service of one frame.
+    /// Creates an exchange for a service of one frame.
     pub fn new(request: Request) -> Exchange {
-        Exchange { requests: vec![request], service: request.service(), received: Vec::new(), count: 0, asked: 0 }
+        Exchange {
+            requests: vec![request],
+            service: request.service(),
+            received: Vec::new(),
+            answer_count: 0,
+            request_count: 0,
+        }
     }
 
-    /// Switches the slave with this address to configuration state.
+    /// Creates the exchange that switches the slave with this address to configuration state.
     pub fn select(address: &LssAddress) -> Exchange {
         Exchange { requests: address.selection().to_vec(), ..Exchange::new(Request::Select(super::Part::Vendor, 0)) }
     }
 
-    /// Asks whether there are slaves in a range.
+    /// Creates the exchange that asks whether there are slaves in a range.
     pub fn identify(range: &LssRange) -> Exchange {
         let requests = range.identification().to_vec();
         Exchange { requests, ..Exchange::new(Request::Identify(super::Limit::Vendor, 0)) }
@@ -55,22 +61,22 @@ impl Exchange {
         self.service
     }
 
-    /// Whether slaves answer this service (not 04h and 15h).
+    /// Whether slaves answer this service (all except 04h and 15h).
     pub fn is_answered(&self) -> bool {
         self.service.answer_specifier().is_some()
     }
 
     /// Starts a request and returns all its frames. A retry also sends the whole address.
     pub fn ask(&mut self) -> Vec<Frame> {
-        self.asked += 1;
+        self.request_count += 1;
         self.requests.iter().map(|request| request.frame()).collect()
     }
 
     /// Handles a received frame; `true` if it answers this service.
     pub fn on_frame(&mut self, frame: &Frame) -> bool {
         let Some(answer) = Answer::parse(frame, self.service) else { return false };
-        self.count += 1;
-        if self.received.len() < KEPT && !self.received.iter().any(|(received, _)| received == frame) {
+        self.answer_count += 1;
+        if self.received.len() < MAX_ANSWERS && !self.received.iter().any(|(received, _)| received == frame) {
             self.received.push((*frame, answer));
         }
         true
@@ -78,13 +84,12 @@ impl Exchange {
 
     /// Whether a slave has answered.
     pub fn has_answer(&self) -> bool {
-        self.count > 0
+        self.answer_count > 0
     }
 
-    /// Whether more than one slave answered: the answers differ, or there were more answers than requests. If all
-    /// slaves answer the service with the same frame, only different answers count.
+    /// Whether more than one slave answered: the answers differ, or there were more answers than requests.
     pub fn has_several_slaves(&self) -> bool {
-        self.received.len() > 1 || self.count > self.asked
+        self.received.len() > 1 || self.answer_count > self.request_count
     }
 
     /// The different answers, with their frames.
@@ -114,10 +119,10 @@ mod tests {
     use super::*;
     use crate::canopen::lss::Part;
 
-    /// The result after `asked` requests and these frames.
-    fn outcome(request: Request, asked: usize, received: &[&str]) -> Result<Answer, ExchangeError> {
+    /// Returns the result after `request_count` requests and these frames.
+    fn outcome(request: Request, request_count: usize, received: &[&str]) -> Result<Answer, ExchangeError> {
         let mut exchange = Exchange::new(request);
-        for _ in 0..asked {
+        for _ in 0..request_count {
             assert_eq!(exchange.ask(), [request.frame()]);
         }
         for text in received {
@@ -161,6 +166,6 @@ mod tests {
             let [a, b, c, d] = number.to_le_bytes();
             exchange.on_frame(&Frame::full(crate::canopen::id::CanId::LSS_SLAVE, [0x5d, a, b, c, d, 0, 0, 0]));
         }
-        assert_eq!((exchange.answers().len(), exchange.has_several_slaves()), (KEPT, true));
+        assert_eq!((exchange.answers().len(), exchange.has_several_slaves()), (MAX_ANSWERS, true));
     }
 }

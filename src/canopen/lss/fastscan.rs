@@ -1,9 +1,9 @@
-//! Fastscan: the address of a slave without a node-ID, bit by bit (CiA 305, 7.5.3.5).
+//! Fastscan: finds the address of a slave without a node-ID, bit by bit (CiA 305, 7.5.3.5).
 //!
 //! Each step asks whether a slave has a number with these upper bits. An answer means yes, no answer means no. A late
 //! answer therefore gives two wrong results. So the found bits are checked after every eight bits, and before the next
-//! number. A check is made twice if a bit before it got no answer, which may be late. If a check fails, the eight bits are searched again with a longer time-out. If it fails again, the whole
-//! number is searched again.
+//! number. If a bit got no answer, the check is made twice, because the answer may be late. If a check fails, the eight
+//! bits are searched again with a longer time-out. If it fails again, the whole number is searched again.
 //!
 //! Several slaves may answer one step, one after the other. The second answer must not count for the next step. So
 //! after the first step with two answers, each step waits until its time-out.
@@ -11,17 +11,17 @@
 use super::{LssAddress, Part, Request};
 use crate::canopen::frame::Frame;
 
-/// The number of failed checks that are allowed for one number.
-const TRIES: u8 = 6;
+/// The scan fails after this number of failed checks of one number.
+const MAX_FAILED_CHECKS: u8 = 6;
 
-/// The number of answers to the impossible probe that is an error. A single one may be a late answer.
-const PROBES: u8 = 3;
+/// The scan fails after this number of answers to the impossible request. A single answer may be a late one.
+const MAX_PROBE_ANSWERS: u8 = 3;
 
 /// The number of bits between two checks.
-const CHECK_EVERY: u8 = 8;
+const CHECK_INTERVAL: u8 = 8;
 
-/// How often the scan restarts because a slave stopped answering.
-const RESTARTS: u8 = 3;
+/// The largest number of restarts because a slave stopped answering.
+const MAX_RESTARTS: u8 = 3;
 
 /// A number that no step asks for. No slave that follows the protocol answers it.
 const UNUSED_NUMBER: u32 = u32::MAX;
@@ -29,13 +29,13 @@ const UNUSED_NUMBER: u32 = u32::MAX;
 /// The answer that a step waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
-    /// Any slave: the longest time-out. It measures how fast the slaves answer.
+    /// An answer from any slave, with the longest time-out. The step measures how fast the slaves answer.
     AllSlaves,
     /// An answer within the usual time, or none.
     Bit,
     /// An expected answer, with a somewhat longer time-out.
     Check,
-    /// An expected answer, with the longest time-out. Without it the scan restarts.
+    /// An expected answer, with the longest time-out. Without an answer, the scan restarts.
     Advance,
 }
 
@@ -87,11 +87,11 @@ fn name(part: Part) -> &'static str {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// All slaves are asked. Their scans restart.
+    /// Asks all slaves, which restarts their scans.
     AllSlaves,
-    /// An impossible request. Slaves that start a scan compare the vendor-ID.
+    /// Asks for a product code: no slave may answer, because slaves at the start of a scan compare the vendor-ID.
     Probe,
-    /// The bit, 31 to 0.
+    /// Asks for this bit, 31 to 0.
     Bit(u8),
     /// Checks the bits found so far, down to this one. Slaves do not change their state.
     Check(u8),
@@ -106,11 +106,11 @@ pub struct Fastscan {
     phase: Phase,
     /// The number of remaining requests to all slaves.
     retries: u32,
-    /// The numbers found.
+    /// The numbers found so far.
     known: [Option<u32>; 4],
     part: Part,
     number: u32,
-    tries: u8,
+    failed_checks: u8,
     restarts: u8,
     /// Whether a step got several answers, or its answers may be late.
     has_several_answers: bool,
@@ -125,7 +125,7 @@ pub struct Fastscan {
 }
 
 impl Fastscan {
-    /// A new scan. The first request to all slaves is repeated `retries` times.
+    /// Creates a scan. The first request to all slaves is repeated `retries` times.
     pub fn new(retries: u32) -> Fastscan {
         Fastscan {
             phase: Phase::AllSlaves,
@@ -133,7 +133,7 @@ impl Fastscan {
             known: [None; 4],
             part: Part::Vendor,
             number: 0,
-            tries: 0,
+            failed_checks: 0,
             restarts: 0,
             has_several_answers: false,
             extensions: 0,
@@ -148,7 +148,7 @@ impl Fastscan {
         super::Answer::parse(frame, super::Service::Fastscan).is_some()
     }
 
-    /// The present step: the frame to send and the answer to wait for.
+    /// Returns the present step: the frame to send and the answer to wait for.
     pub fn step(&self) -> Step {
         let ask = |number, bit_check, sub, next| Request::Fastscan { number, bit_check, sub, next };
         let (request, wait) = match self.phase {
@@ -181,7 +181,7 @@ impl Fastscan {
             Phase::AllSlaves => return Progress::NoneFound,
             Phase::Probe if answered => {
                 self.probe_answers += 1;
-                if self.probe_answers >= PROBES {
+                if self.probe_answers >= MAX_PROBE_ANSWERS {
                     return Progress::Failed(FastscanError::AnswersEverything);
                 }
             }
@@ -194,9 +194,9 @@ impl Fastscan {
                     self.number |= 1 << bit;
                     self.has_missed_answers = true;
                 }
-                self.phase = if bit % CHECK_EVERY == 0 { Phase::Check(bit) } else { Phase::Bit(bit - 1) };
+                self.phase = if bit % CHECK_INTERVAL == 0 { Phase::Check(bit) } else { Phase::Bit(bit - 1) };
             }
-            // A late answer to a bit may have passed the check. The next check then gets no answer.
+            // The answer may be a late answer to a bit. A second check then gets no answer.
             Phase::Check(_) if answered && self.has_missed_answers => self.has_missed_answers = false,
             Phase::Check(bit) if answered => self.phase = bit.checked_sub(1).map_or(Phase::Advance, Phase::Bit),
             Phase::Check(bit) => return self.on_failed_check(bit),
@@ -212,7 +212,7 @@ impl Fastscan {
                 // It is unknown whether the slave continued: restart, and check the numbers found so far in one step
                 // each.
                 self.restarts += 1;
-                if self.restarts > RESTARTS {
+                if self.restarts > MAX_RESTARTS {
                     return self.contradiction();
                 }
                 if self.known[usize::from(self.part.number())].take().is_some() {
@@ -226,16 +226,16 @@ impl Fastscan {
         Progress::Continue
     }
 
-    /// Finds the bits from `bit` upwards again, because no slave has the bits found so far.
+    /// Searches the bits from `bit` upwards again, because no slave has the bits found so far.
     fn on_failed_check(&mut self, bit: u8) -> Progress {
         self.has_missed_answers = false;
-        self.tries += 1;
-        if self.tries >= TRIES {
+        self.failed_checks += 1;
+        if self.failed_checks >= MAX_FAILED_CHECKS {
             return self.contradiction();
         }
         self.extensions += 1;
-        if self.tries % 2 == 1 {
-            let (above, top) = (bit + CHECK_EVERY, bit + CHECK_EVERY - 1);
+        if self.failed_checks % 2 == 1 {
+            let (above, top) = (bit + CHECK_INTERVAL, bit + CHECK_INTERVAL - 1);
             self.number &= u32::MAX.checked_shl(above.into()).unwrap_or(0);
             self.phase = Phase::Bit(top);
         } else {
@@ -248,7 +248,7 @@ impl Fastscan {
 
     fn start_part(&mut self, part: Part) {
         self.part = part;
-        self.tries = 0;
+        self.failed_checks = 0;
         match self.known[usize::from(part.number())] {
             Some(number) => {
                 self.number = number;
@@ -285,7 +285,7 @@ mod tests {
             Slave { address, compares: Part::Vendor, found: false }
         }
 
-        fn hears(&mut self, request: Request) -> bool {
+        fn receive(&mut self, request: Request) -> bool {
             let Request::Fastscan { number, bit_check, sub, next } = request else { return false };
             if bit_check == Request::ALL_SLAVES {
                 (self.compares, self.found) = (Part::Vendor, false);
@@ -303,13 +303,13 @@ mod tests {
         }
     }
 
-    /// Simulates a scan. `late` decides for each step whether its answers arrive in the next one.
+    /// Simulates a scan. `late` decides for each step whether the answers arrive only in the next step.
     fn scan(slaves: &mut [Slave], late: &mut dyn FnMut(Step) -> bool) -> (Progress, usize) {
         let (mut scan, mut steps, mut left_over) = (Fastscan::new(1), 0, 0);
         loop {
             let step = scan.step();
             steps += 1;
-            let answers = slaves.iter_mut().filter_map(|slave| slave.hears(step.request).then_some(())).count();
+            let answers = slaves.iter_mut().filter_map(|slave| slave.receive(step.request).then_some(())).count();
             let (now, later) = if late(step) { (0, answers) } else { (answers, 0) };
             let answers = now + std::mem::replace(&mut left_over, later);
             let progress = scan.on_end(answers);
@@ -337,7 +337,7 @@ mod tests {
             let (mut scan, mut step) = (Fastscan::new(1), 0);
             let end = loop {
                 step += 1;
-                let answered = slave.hears(scan.step().request) && step <= last;
+                let answered = slave.receive(scan.step().request) && step <= last;
                 match scan.on_end(usize::from(answered)) {
                     Progress::Continue => {}
                     end => break end,

@@ -119,11 +119,11 @@ impl fmt::Display for Service {
 pub enum Request {
     /// 04h: switches all slaves to a state.
     SwitchGlobal(Mode),
-    /// 40h to 43h: selects the slave with these four numbers. It answers the last one.
+    /// 40h to 43h: selects the slave with these four numbers. It answers the last of the four requests.
     Select(Part, u32),
     /// 11h: sets the node-ID; `None` removes it.
     ConfigureNodeId(Option<NodeId>),
-    /// 13h: sets the bit rate by table and index. Table 0 is that of CiA 305.
+    /// 13h: sets the bit rate by table and index. Table 0 is the table of CiA 305.
     ConfigureBitTiming {
         /// The table.
         table: u8,
@@ -141,8 +141,8 @@ pub enum Request {
     Inquire(Part),
     /// 5Eh.
     InquireNodeId,
-    /// 46h to 4Bh: asks for slaves with this vendor-ID, this product code, and numbers in this range. Slaves answer the
-    /// last one.
+    /// 46h to 4Bh: asks for slaves with this vendor-ID and product code, and with numbers in these ranges. Slaves answer
+    /// the last of the six requests.
     Identify(Limit, u32),
     /// 4Ch: asks for slaves without a node-ID.
     IdentifyUnconfigured,
@@ -183,7 +183,7 @@ impl Limit {
 }
 
 impl Request {
-    /// The bit check that all slaves without a node-ID answer.
+    /// The value of `bit_check` that all slaves without a node-ID answer.
     pub const ALL_SLAVES: u8 = 0x80;
 
     /// The fastscan request that all slaves without a node-ID answer.
@@ -207,7 +207,7 @@ impl Request {
         }
     }
 
-    /// The frame: always eight bytes; unused bytes are 0.
+    /// Returns the frame: always eight bytes; unused bytes are 0.
     pub fn frame(self) -> Frame {
         let with_number = |specifier: u8, number: u32| {
             let [a, b, c, d] = number.to_le_bytes();
@@ -346,7 +346,7 @@ mod tests {
     fn parsed_requests_round_trip(bytes in proptest::collection::vec(any::<u8>(), 0..=8)) {
                 let frame = Frame::new(CanId::LSS_MASTER, &bytes).expect("a frame");
                 if let Some(request) = Request::parse(&frame) {
-                    // The parsed request is the one sent, apart from unused bytes.
+                    // The parsed request equals the sent request, except for unused bytes.
                     prop_assert_eq!(Request::parse(&request.frame()), Some(request));
                 }
             }

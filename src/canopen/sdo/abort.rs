@@ -44,7 +44,7 @@ impl AbortCode {
     /// General error.
     pub const GENERAL: AbortCode = AbortCode(0x0800_0000);
 
-    /// The meaning of the code in CiA 301; `None` for codes that it does not define.
+    /// Returns the meaning of the code; `None` if CiA 301 does not define the code.
     pub fn meaning(self) -> Option<&'static str> {
         Some(match self.0 {
             0x0503_0000 => "toggle bit not alternated",

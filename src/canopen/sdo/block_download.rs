@@ -1,7 +1,7 @@
 //! SDO block download: the client writes an object in sub-blocks of up to 127 segments, each acknowledged as
 //! a whole (CiA 301, 7.2.4.3.9 to 7.2.4.3.11).
 //!
-//! All segments of a block go to `out` at once. The caller paces them and reports each frame that was sent
+//! All segments of a block go to `out` at once. The caller limits their rate and reports each sent frame
 //! ([`BlockDownload::on_sent`]). Segments that the server does not acknowledge are sent again. Nothing is repeated
 //! after a time-out.
 
@@ -24,8 +24,8 @@ pub struct BlockDownload {
     state: State,
     /// Whether the server checks a CRC.
     crc: bool,
-    /// Consecutive blocks of which the server accepted nothing.
-    setbacks: u8,
+    /// The number of consecutive blocks of which the server accepted no segment.
+    stalled_blocks: u8,
     /// The acknowledgement of the previous block.
     acknowledge: Option<Frame>,
 }
@@ -46,13 +46,13 @@ enum State {
 }
 
 impl BlockDownload {
-    /// A download of `data`, of any length, to `object` of `node`.
+    /// Creates a download of `data` (any length) to `object` of `node`.
     pub fn new(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> BlockDownload {
         let state = State::Initiated;
-        BlockDownload { node, object, data, size, state, crc: false, setbacks: 0, acknowledge: None }
+        BlockDownload { node, object, data, size, state, crc: false, stalled_blocks: 0, acknowledge: None }
     }
 
-    /// The initiate request. It always offers a CRC.
+    /// Returns the initiate request, which always offers a CRC.
     pub fn request(&self) -> Frame {
         let [a, b, c] = self.object.multiplexer();
         let mut frame = [0xc4, a, b, c, 0, 0, 0, 0];
@@ -79,7 +79,7 @@ impl BlockDownload {
         }
     }
 
-    /// One of the frames was sent. A server never acknowledges unsent segments. So the number of sent segments
+    /// Counts a sent frame. A server never acknowledges unsent segments. So the number of sent segments
     /// identifies a repeated acknowledgement of the previous block.
     pub fn on_sent(&mut self) {
         if let State::SubBlock { count, sent, .. } = &mut self.state {
@@ -87,8 +87,8 @@ impl BlockDownload {
         }
     }
 
-    /// Handles a received frame. Frames to send go to `out`; earlier frames that were not sent yet must then be
-    /// dropped.
+    /// Handles a received frame. Frames to send go to `out`. If there are any, the caller must drop earlier frames that
+    /// were not sent yet.
     pub fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<()> {
         if let Some(code) = abort_of(frame, self.node, self.object) {
             return Progress::Failed(TransferError::Aborted(code));
@@ -106,7 +106,7 @@ impl BlockDownload {
             (State::Initiated, _) if multiplexer(data) == Some(self.object) => {
                 Progress::Failed(TransferError::Violation(Violation::Command, *frame))
             }
-            (State::SubBlock { start, count, sent }, 0xa2) => self.acknowledged(start, count, sent, frame, out),
+            (State::SubBlock { start, count, sent }, 0xa2) => self.on_acknowledge(start, count, sent, frame, out),
             (State::SubBlock { .. }, 0xa1) => self.fail(Violation::Command, frame, out),
             (State::Ended, 0xa1) => Progress::Done(()),
             _ => Progress::NotOurs,
@@ -125,23 +125,30 @@ impl BlockDownload {
         out.push(abort_frame(self.node, self.object, code));
     }
 
-    fn acknowledged(&mut self, start: usize, count: u8, sent: u8, frame: &Frame, out: &mut Vec<Frame>) -> Progress<()> {
+    fn on_acknowledge(
+        &mut self,
+        start: usize,
+        count: u8,
+        sent: u8,
+        frame: &Frame,
+        out: &mut Vec<Frame>,
+    ) -> Progress<()> {
         let data = frame.data();
-        let Some(&taken) = data.get(1) else { return self.fail(Violation::Short, frame, out) };
-        if taken > sent {
+        let Some(&accepted) = data.get(1) else { return self.fail(Violation::Short, frame, out) };
+        if accepted > sent {
             if self.acknowledge == Some(*frame) {
                 return Progress::NotOurs;
             }
             return self.fail(Violation::Sequence, frame, out);
         }
         self.acknowledge = Some(*frame);
-        let next = start + 7 * usize::from(taken);
-        if taken == count && next >= self.data.len() {
+        let next = start + 7 * usize::from(accepted);
+        if accepted == count && next >= self.data.len() {
             self.send_end(next - self.data.len(), out);
             return Progress::Continue;
         }
-        self.setbacks = if taken > 0 { 0 } else { self.setbacks + 1 };
-        if self.setbacks > MAX_STALLED_BLOCKS {
+        self.stalled_blocks = if accepted > 0 { 0 } else { self.stalled_blocks + 1 };
+        if self.stalled_blocks > MAX_STALLED_BLOCKS {
             return self.fail(Violation::Stuck, frame, out);
         }
         self.send_sub_block(next, data.get(2).copied(), frame, out)
@@ -160,7 +167,7 @@ impl BlockDownload {
             return self.fail(Violation::BlockSize, frame, out);
         };
         let rest = &self.data[start..];
-        // An empty object is one segment without valid bytes.
+        // An empty object is sent as one segment without valid bytes.
         let last = rest.len().div_ceil(7).max(1);
         let mut count = 0;
         for sequence in 1..=block_size.get() {

@@ -28,13 +28,13 @@ pub struct BlockUpload {
     crc: bool,
     /// The number of bytes missing in the frame of the last segment.
     missing: usize,
-    /// Consecutive blocks without progress or without an end.
+    /// The number of consecutive blocks without progress or without an end.
     blocks_without_progress: u8,
     /// Whether segments were repeated.
-    disturbed: bool,
+    has_repeated_segments: bool,
     /// The limit for the size of the object in bytes.
     limit: usize,
-    /// Used if the server answers with an expedited or segmented upload.
+    /// Handles the answers if the server chooses an expedited or segmented upload.
     plain: Upload,
 }
 
@@ -44,11 +44,11 @@ enum State {
     /// The server chose an expedited or segmented answer.
     Plain,
     SubBlock {
-        /// Accepted segments, in order.
-        taken: u8,
+        /// The number of segments that were accepted in order.
+        accepted: u8,
         /// The highest sequence number seen.
         highest: u8,
-        /// The previously acknowledged segment; 0 before the first block.
+        /// The segment number in the last acknowledgement; 0 before the first block.
         acknowledged: u8,
         /// The frame that ended the previous block. A repetition of this frame is ignored.
         closing: Option<Frame>,
@@ -60,7 +60,7 @@ enum State {
 }
 
 impl BlockUpload {
-    /// An upload of `object` from `node`. `threshold` is the "protocol switch threshold" of the standard, 0 for none.
+    /// Creates an upload of `object` from `node`. `threshold` is the "protocol switch threshold" of the standard, 0 for none.
     /// If the object has at most this many bytes, the server may answer expedited or segmented. For `accept_60` see
     /// [`Upload::new`].
     pub fn new(node: NodeId, object: ObjectId, threshold: u8, accept_60: bool) -> BlockUpload {
@@ -75,26 +75,26 @@ impl BlockUpload {
             crc: false,
             missing: 0,
             blocks_without_progress: 0,
-            disturbed: false,
+            has_repeated_segments: false,
             limit: LONGEST,
             plain: Upload::new(node, object, accept_60),
         }
     }
 
-    /// The same upload with another block size.
+    /// Sets another block size.
     pub fn with_block_size(mut self, block_size: BlockSize) -> BlockUpload {
         self.block_size = block_size;
         self
     }
 
-    /// The same upload of an object that has at most this many bytes.
+    /// Limits the size of the object to this number of bytes.
     pub fn up_to(mut self, limit: usize) -> BlockUpload {
         self.limit = limit.min(LONGEST);
         self.plain = self.plain.up_to(limit);
         self
     }
 
-    /// The initiate request. It always asks for a CRC.
+    /// Returns the initiate request, which always asks for a CRC.
     pub fn request(&self) -> Frame {
         let [a, b, c] = self.object.multiplexer();
         let request = [0xa4, a, b, c, self.block_size.get(), self.threshold, 0, 0];
@@ -135,7 +135,7 @@ impl BlockUpload {
         };
         match self.state {
             State::Initiated => self.initiated(head, frame, out),
-            State::SubBlock { taken: 0, highest: 0, acknowledged: 0, .. }
+            State::SubBlock { accepted: 0, highest: 0, acknowledged: 0, .. }
                 if self.is_end_of_empty_object(head, frame) =>
             {
                 self.end(head, None, frame, out)
@@ -149,15 +149,15 @@ impl BlockUpload {
     /// Handles a time-out. Within a block, acknowledges the received segments, so that the server repeats the rest.
     /// Otherwise aborts the transfer. `None` means that the transfer continues.
     pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> Option<TransferError> {
-        if let State::SubBlock { taken, acknowledged, .. } = self.state {
+        if let State::SubBlock { accepted, acknowledged, .. } = self.state {
             // If no segment was received, either the block or our last acknowledgement was lost. A new acknowledgement
             // is right in both cases only if the last one was 0.
-            let unambiguous = taken > 0 || acknowledged == 0;
+            let unambiguous = accepted > 0 || acknowledged == 0;
             let provable = self.crc || self.announced.is_some();
             if unambiguous && provable && self.blocks_without_progress < MAX_STALLED_BLOCKS {
                 self.blocks_without_progress += 1;
-                self.disturbed = true;
-                self.acknowledge(taken, None, out);
+                self.has_repeated_segments = true;
+                self.acknowledge(accepted, None, out);
                 return None;
             }
         }
@@ -176,7 +176,7 @@ impl BlockUpload {
         if multiplexer(data) != Some(self.object) {
             return Progress::NotOurs;
         }
-        // C6h with one changed bit is 46h: expedited without a size, although bits 2 and 3 are only for the size.
+        // 46h may be C6h with one wrong bit: an expedited answer without a size must not set bits 2 and 3.
         if head & 0xf3 == 0x42 && head & 0x0c != 0 {
             return self.fail(Violation::Command, frame, out);
         }
@@ -196,20 +196,20 @@ impl BlockUpload {
         if self.announced.is_some_and(|size| usize::try_from(size).is_ok_and(|size| size > self.limit)) {
             return self.fail(Violation::TooLong, frame, out);
         }
-        self.state = State::SubBlock { taken: 0, highest: 0, acknowledged: 0, closing: None };
+        self.state = State::SubBlock { accepted: 0, highest: 0, acknowledged: 0, closing: None };
         self.send(0xa3, 0, 0, out);
         Progress::Continue
     }
 
     fn segment(&mut self, head: u8, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
-        let State::SubBlock { taken, highest, acknowledged, closing } = self.state else { return Progress::NotOurs };
+        let State::SubBlock { accepted, highest, acknowledged, closing } = self.state else { return Progress::NotOurs };
         let sequence = head & 0x7f;
         let is_last = head & 0x80 != 0;
-        let in_order = sequence == taken + 1;
+        let in_order = sequence == accepted + 1;
         if sequence == 0 || sequence > self.block_size.get() || (!in_order && closing == Some(*frame)) {
             return Progress::NotOurs;
         }
-        let taken = if in_order {
+        let accepted = if in_order {
             let part = frame.data().get(1..).unwrap_or_default();
             // The end frame gives the number of valid bytes in the last segment only.
             if part.len() < 7 && !is_last {
@@ -218,36 +218,36 @@ impl BlockUpload {
             self.missing = 7 - part.len();
             self.bytes.extend_from_slice(part);
             self.bytes.extend(std::iter::repeat_n(0, self.missing));
-            // The end frame states how many bytes of the last segment are valid.
+            // The end frame may declare up to six bytes of the last segment as unused.
             if self.bytes.len() > self.limit.saturating_add(6) {
                 return self.fail(Violation::TooLong, frame, out);
             }
             sequence
         } else {
-            taken
+            accepted
         };
         if in_order && is_last {
-            self.acknowledge(taken, Some(*frame), out);
+            self.acknowledge(accepted, Some(*frame), out);
             self.state = State::Acknowledged { closing: *frame };
         } else if is_last || sequence == self.block_size.get() {
-            self.disturbed |= !in_order;
-            self.blocks_without_progress = if taken > 0 { 0 } else { self.blocks_without_progress + 1 };
+            self.has_repeated_segments |= !in_order;
+            self.blocks_without_progress = if accepted > 0 { 0 } else { self.blocks_without_progress + 1 };
             if self.blocks_without_progress > MAX_STALLED_BLOCKS {
                 return self.fail(Violation::Stuck, frame, out);
             }
-            self.acknowledge(taken, Some(*frame), out);
+            self.acknowledge(accepted, Some(*frame), out);
         } else if in_order || sequence > highest {
-            self.state = State::SubBlock { taken, highest: highest.max(sequence), acknowledged, closing };
+            self.state = State::SubBlock { accepted, highest: highest.max(sequence), acknowledged, closing };
         } else {
             return Progress::NotOurs;
         }
         Progress::Continue
     }
 
-    /// Acknowledges the first `taken` segments of the block and starts the next one.
-    fn acknowledge(&mut self, taken: u8, closing: Option<Frame>, out: &mut Vec<Frame>) {
-        self.state = State::SubBlock { taken: 0, highest: 0, acknowledged: taken, closing };
-        self.send(0xa2, taken, self.block_size.get(), out);
+    /// Acknowledges the first `accepted` segments of the block and starts the next one.
+    fn acknowledge(&mut self, accepted: u8, closing: Option<Frame>, out: &mut Vec<Frame>) {
+        self.state = State::SubBlock { accepted: 0, highest: 0, acknowledged: accepted, closing };
+        self.send(0xa2, accepted, self.block_size.get(), out);
     }
 
     /// Whether this is the end frame of an object of 0 bytes. Some servers omit the empty segment before it.
@@ -259,16 +259,16 @@ impl BlockUpload {
     fn end(&mut self, head: u8, closing: Option<Frame>, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
         let data = frame.data();
         let unused = usize::from(head >> 2 & 7);
-        let misnamed = self.is_last_segment_full(unused, data);
-        let length = if misnamed { self.bytes.len() } else { self.bytes.len().saturating_sub(unused) };
+        let is_last_full = self.is_last_segment_full(unused, data);
+        let length = if is_last_full { self.bytes.len() } else { self.bytes.len().saturating_sub(unused) };
         let expected = if self.crc { crc16(&self.bytes[..length]) } else { 0 };
         let [low, high] = expected.to_le_bytes();
-        // If segment 65 is the last one, it starts like an end frame. Its repetition is not an end frame, unless it has
-        // the expected contents.
+        // If segment 65 is the last one, it starts like an end frame. A repetition of this segment is not an end frame,
+        // unless it has the expected contents.
         if closing == Some(*frame) && data != [head, low, high, 0, 0, 0, 0, 0] {
             return Progress::NotOurs;
         }
-        if !misnamed && unused < self.missing {
+        if !is_last_full && unused < self.missing {
             return self.fail(Violation::Short, frame, out);
         }
         if self.crc {
@@ -279,17 +279,17 @@ impl BlockUpload {
             }
         }
         // The CRC does not detect missing leading zeros.
-        if self.disturbed && self.announced.is_some_and(|size| usize::try_from(size) != Ok(length)) {
+        if self.has_repeated_segments && self.announced.is_some_and(|size| usize::try_from(size) != Ok(length)) {
             return self.fail(Violation::Size, frame, out);
         }
         self.send(0xa1, 0, 0, out);
         let mut bytes = std::mem::take(&mut self.bytes);
         bytes.truncate(length);
-        Progress::Done(Uploaded { announced: self.announced, has_wrong_end: misnamed, ..Uploaded::complete(bytes) })
+        Progress::Done(Uploaded { announced: self.announced, has_wrong_end: is_last_full, ..Uploaded::complete(bytes) })
     }
 
     /// Whether an end frame wrongly declares the whole last segment invalid, although the announced size and the CRC
-    /// include it. durand 0.5.0 does this if the size is a multiple of seven bytes.
+    /// include the segment. durand 0.5.0 does this if the size is a multiple of seven bytes.
     fn is_last_segment_full(&self, unused: usize, end: &[u8]) -> bool {
         let announced = self.announced.is_some_and(|size| usize::try_from(size) == Ok(self.bytes.len()));
         let given = matches!(end, [_, low, high, ..] if u16::from_le_bytes([*low, *high]) == crc16(&self.bytes));

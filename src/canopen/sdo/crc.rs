@@ -7,23 +7,23 @@ const TABLE: [u16; 256] = table();
 
 const fn table() -> [u16; 256] {
     let mut table = [0; 256];
-    let mut at = 0;
+    let mut index = 0;
     let mut byte: u16 = 0;
-    while at < table.len() {
+    while index < table.len() {
         let mut crc = byte << 8;
         let mut bit = 0;
         while bit < 8 {
             crc = if crc & 0x8000 == 0 { crc << 1 } else { crc << 1 ^ POLYNOMIAL };
             bit += 1;
         }
-        table[at] = crc;
-        at += 1;
+        table[index] = crc;
+        index += 1;
         byte += 1;
     }
     table
 }
 
-/// The CRC of `bytes`.
+/// Computes the CRC of `bytes`.
 pub fn crc16(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0, |crc: u16, byte| {
         let [high, _] = crc.to_be_bytes();

@@ -36,7 +36,7 @@ enum State {
 }
 
 impl Download {
-    /// A download of `data` to `object` of `node`. One to four bytes are sent expedited, other sizes segmented. An
+    /// Creates a download of `data` to `object` of `node`. One to four bytes are sent expedited, other sizes segmented. An
     /// expedited transfer cannot indicate 0 bytes.
     pub fn new(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Download {
         Download { node, object, data, size, state: State::Initiated }
@@ -46,7 +46,7 @@ impl Download {
         (1..=4).contains(&self.data.len())
     }
 
-    /// The initiate request.
+    /// Returns the initiate request.
     pub fn request(&self) -> Frame {
         let [a, b, c] = self.object.multiplexer();
         let mut frame = [0, a, b, c, 0, 0, 0, 0];
@@ -69,7 +69,7 @@ impl Download {
         Frame::full(CanId::sdo_request(self.node), frame)
     }
 
-    /// Whether the server has answered. If the transfer fails, it then needs an abort.
+    /// Whether the server has answered. If the transfer then fails, the server needs an abort.
     pub fn has_begun(&self) -> bool {
         self.state != State::Initiated
     }

@@ -1,4 +1,4 @@
-//! The size rule: from the delivered bytes to a value of the expected type.
+//! Converts the delivered bytes of an object to a value of the expected type.
 //!
 //! Deviations of real sensors are accepted, and each one is reported.
 
@@ -83,31 +83,31 @@ pub enum FitError {
     Truncated(Frame),
 }
 
-/// Converts delivered bytes to `data_type`; with `None` the bytes stay as they are.
+/// Converts delivered bytes to `data_type`; if it is `None`, the bytes stay as they are.
 ///
-/// If no size is indicated, further bytes than those of the type are ignored. If a size is indicated, further bytes
-/// must be zero or the sign of a negative integer. An integer may have fewer bytes than its type, unless the length
+/// If no size is indicated, bytes beyond the size of the type are ignored. If a size is indicated, these bytes must be
+/// zero or the sign extension of a negative integer. An integer may have fewer bytes than its type, unless the length
 /// differs from the announced one.
 ///
 /// # Errors
 /// The bytes do not fit the type.
 pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, FitError> {
     let found = uploaded.bytes.len();
-    let odd = uploaded.announced.filter(|&size| usize::try_from(size) != Ok(found));
-    let odd = odd.map(|announced| Note::Announced { announced, found });
-    let odd = odd.or(uploaded.has_short_segment.then_some(Note::ShortSegment));
-    let odd = odd.or(uploaded.has_wrong_end.then_some(Note::WrongEnd));
+    let deviation = uploaded.announced.filter(|&size| usize::try_from(size) != Ok(found));
+    let deviation = deviation.map(|announced| Note::Announced { announced, found });
+    let deviation = deviation.or(uploaded.has_short_segment.then_some(Note::ShortSegment));
+    let deviation = deviation.or(uploaded.has_wrong_end.then_some(Note::WrongEnd));
     let suffices = |data_type: DataType| data_type.width().is_some_and(|width| width <= found);
     if let Some(frame) = uploaded.truncated.filter(|_| !data_type.is_some_and(suffices)) {
         return Err(FitError::Truncated(frame));
     }
     let Some(data_type) = data_type else {
-        let note = if uploaded.indicated { odd } else { Some(Note::SizeNotIndicated) };
+        let note = if uploaded.indicated { deviation } else { Some(Note::SizeNotIndicated) };
         return Ok(Fitted { value: Value::Bytes(uploaded.bytes.clone()), note });
     };
     let error = |error: WidthError| FitError::Width { data_type, expected: error.expected, found };
     let Some(expected) = data_type.width() else {
-        return Ok(Fitted { value: data_type.decode(&uploaded.bytes).map_err(error)?, note: odd });
+        return Ok(Fitted { value: data_type.decode(&uploaded.bytes).map_err(error)?, note: deviation });
     };
     if found < expected {
         let narrow = match data_type {
@@ -120,15 +120,15 @@ pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, F
         let value = narrow.decode(&uploaded.bytes).map_err(error)?;
         return Ok(Fitted { value, note: Some(Note::Narrower { expected, found }) });
     }
-    let (counted, excess) = uploaded.bytes.split_at(expected);
+    let (value_bytes, excess) = uploaded.bytes.split_at(expected);
     if excess.is_empty() || !uploaded.indicated {
-        return Ok(Fitted { value: data_type.decode(counted).map_err(error)?, note: odd });
+        return Ok(Fitted { value: data_type.decode(value_bytes).map_err(error)?, note: deviation });
     }
-    let negative = matches!(data_type, DataType::Integer(_)) && counted.last().is_some_and(|byte| byte & 0x80 != 0);
-    let filling = |byte: u8| excess.iter().all(|&found| found == byte);
-    if filling(0) || negative && filling(0xff) {
+    let negative = matches!(data_type, DataType::Integer(_)) && value_bytes.last().is_some_and(|byte| byte & 0x80 != 0);
+    let excess_is = |byte: u8| excess.iter().all(|&found| found == byte);
+    if excess_is(0) || negative && excess_is(0xff) {
         let note = Some(Note::Wider { expected, found });
-        return Ok(Fitted { value: data_type.decode(counted).map_err(error)?, note });
+        return Ok(Fitted { value: data_type.decode(value_bytes).map_err(error)?, note });
     }
     Err(FitError::Width { data_type, expected, found })
 }

@@ -25,7 +25,7 @@ use super::frame::Frame;
 use super::id::{CanId, NodeId};
 use super::object::ObjectId;
 
-/// The result of a frame or a time-out.
+/// The result of handling a frame or a time-out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Progress<T> {
     /// The frame does not belong to this transfer, or repeats an earlier frame. Nothing changed.
@@ -39,12 +39,12 @@ pub enum Progress<T> {
 }
 
 impl<T> Progress<T> {
-    /// The same progress with a converted result.
-    pub fn map<U>(self, result: impl FnOnce(T) -> U) -> Progress<U> {
+    /// Converts the result of a complete transfer.
+    pub fn map<U>(self, convert: impl FnOnce(T) -> U) -> Progress<U> {
         match self {
             Progress::NotOurs => Progress::NotOurs,
             Progress::Continue => Progress::Continue,
-            Progress::Done(done) => Progress::Done(result(done)),
+            Progress::Done(done) => Progress::Done(convert(done)),
             Progress::Failed(error) => Progress::Failed(error),
         }
     }
@@ -115,14 +115,14 @@ impl Violation {
     }
 }
 
-/// The abort frame that a client sends for `object` (CiA 301, 7.2.4.3.17).
+/// Returns the abort frame that a client sends for `object` (CiA 301, 7.2.4.3.17).
 pub fn abort_frame(node: NodeId, object: ObjectId, code: AbortCode) -> Frame {
     let [a, b, c] = object.multiplexer();
     let [d, e, f, g] = code.0.to_le_bytes();
     Frame::full(CanId::sdo_request(node), [0x80, a, b, c, d, e, f, g])
 }
 
-/// The object in bytes 1 to 3 of a frame (the multiplexer), if it has them.
+/// Returns the object in bytes 1 to 3 of a frame (the multiplexer), if the frame has them.
 pub fn multiplexer(data: &[u8]) -> Option<ObjectId> {
     match data {
         [_, a, b, c, ..] => Some(ObjectId::from_multiplexer([*a, *b, *c])),
@@ -130,7 +130,7 @@ pub fn multiplexer(data: &[u8]) -> Option<ObjectId> {
     }
 }
 
-/// The number in bytes 4 to 7, if the frame has them.
+/// Returns the number in bytes 4 to 7, if the frame has them.
 fn number(data: &[u8]) -> Option<u32> {
     match data {
         [_, _, _, _, a, b, c, d, ..] => Some(u32::from_le_bytes([*a, *b, *c, *d])),
@@ -138,13 +138,13 @@ fn number(data: &[u8]) -> Option<u32> {
     }
 }
 
-/// The abort code of a frame that aborts the transfer of `object`. A truncated code reads as 0.
+/// Returns the abort code if `frame` aborts the transfer of `object`. A truncated code is read as 0.
 ///
 /// An abort with the identifier of the request also counts. The D-20-9 manual (page 7) shows such an abort, and an
 /// abort of another master also ends the transfer.
 fn abort_of(frame: &Frame, node: NodeId, object: ObjectId) -> Option<AbortCode> {
-    let here = frame.id() == CanId::sdo_response(node) || frame.id() == CanId::sdo_request(node);
+    let is_channel = frame.id() == CanId::sdo_response(node) || frame.id() == CanId::sdo_request(node);
     let data = frame.data();
-    (here && data.first() == Some(&0x80) && multiplexer(data) == Some(object))
+    (is_channel && data.first() == Some(&0x80) && multiplexer(data) == Some(object))
         .then(|| AbortCode(number(data).unwrap_or(0)))
 }

@@ -5,13 +5,13 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 
-/// The limit for the size of an object in bytes: no file is longer.
+/// The limit for the size of an object in bytes. No file in a device is larger.
 pub const LONGEST: usize = 64 << 20;
 
 /// The answer to an upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Uploaded {
-    /// The bytes in wire order. An expedited answer without a size has all four.
+    /// The bytes in wire order. An expedited answer without a size has all four bytes.
     pub bytes: Vec<u8>,
     /// Whether the server indicated the size. `false` for an expedited answer without a size (42h, 60h).
     pub indicated: bool,
@@ -27,7 +27,7 @@ pub struct Uploaded {
 }
 
 impl Uploaded {
-    /// Bytes whose size the server indicated.
+    /// Creates the result for bytes whose size the server indicated.
     pub fn complete(bytes: Vec<u8>) -> Uploaded {
         Uploaded {
             bytes,
@@ -74,7 +74,7 @@ enum State {
 }
 
 impl Upload {
-    /// An upload of `object` from `node`. With `accept_60`, command specifier 60h counts as an answer without a size
+    /// Creates an upload of `object` from `node`. If `accept_60` is set, 60h counts as an answer without a size
     /// ([`crate::device::quirk::Quirk::UploadAnswered60`]).
     pub fn new(node: NodeId, object: ObjectId, accept_60: bool) -> Upload {
         let (state, bytes) = (State::Initiated, Vec::new());
@@ -82,19 +82,19 @@ impl Upload {
         Upload { node, object, state, bytes, announced: None, has_short_segment: false, accept_60, limit, segments }
     }
 
-    /// The same upload of an object that has at most this many bytes.
+    /// Limits the size of the object to this number of bytes.
     pub fn up_to(mut self, limit: usize) -> Upload {
         self.limit = limit.min(LONGEST);
         self
     }
 
-    /// The request that starts the transfer.
+    /// Returns the request that starts the transfer.
     pub fn request(&self) -> Frame {
         let [a, b, c] = self.object.multiplexer();
         Frame::full(CanId::sdo_request(self.node), [0x40, a, b, c, 0, 0, 0, 0])
     }
 
-    /// Whether the server has answered. If the transfer fails, it then needs an abort.
+    /// Whether the server has answered. If the transfer then fails, the server needs an abort.
     pub fn has_begun(&self) -> bool {
         self.state != State::Initiated
     }
@@ -171,7 +171,7 @@ impl Upload {
         let unused = usize::from(command >> 1 & 7);
         let Some(part) = data.get(1..8 - unused) else { return self.fail(Violation::Short, frame, out) };
         self.bytes.extend_from_slice(part);
-        // Each segment but the last one has at least one byte.
+        // Each segment except the last one has at least one byte, so the number of segments is limited, too.
         self.segments += 1;
         if self.bytes.len() > self.limit || self.segments > self.limit + 1 {
             return self.fail(Violation::TooLong, frame, out);

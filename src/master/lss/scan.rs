@@ -5,8 +5,8 @@ use crate::bus::Mono;
 use crate::canopen::lss::{Fastscan, LssAddress, Mode, Progress, Request, Step, Wait};
 use std::time::Duration;
 
-/// The shortest wait for an answer. Most steps of a scan take this time. After a later answer, a part of the scan is
-/// repeated.
+/// The shortest wait for an answer. Most steps of a scan take this time. If an answer arrives later, a part of the
+/// scan is repeated.
 const MIN_STEP_TIMEOUT: Duration = Duration::from_millis(4);
 
 /// The shortest wait for an expected answer.
@@ -24,7 +24,7 @@ const RECENT_ANSWERS: usize = 16;
 /// The measured answer time of the slaves.
 #[derive(Clone, Debug)]
 struct Pace {
-    /// The times of the recent answers. The oldest one is replaced.
+    /// The times of the recent answers. A new time replaces the oldest one.
     recent: [Duration; RECENT_ANSWERS],
     /// The number of answers.
     count: usize,
@@ -39,30 +39,30 @@ impl Pace {
     }
 
     /// Records the time of an answer.
-    fn note(&mut self, latency: Duration) {
+    fn record(&mut self, latency: Duration) {
         self.recent[self.count % RECENT_ANSWERS] = latency;
         self.count += 1;
     }
 
-    /// The time of the slowest recent answer. A single answer that is later than all others does not count.
+    /// Returns the time of the slowest recent answer. If there are more than two answers, the slowest one is ignored.
     fn slowest(&self) -> Duration {
         let mut sorted = self.recent;
         sorted.sort_unstable();
         sorted[RECENT_ANSWERS - if self.count > 2 { 2 } else { 1 }]
     }
 
-    /// The time-out of a step: 1.5 times the slowest answer plus a margin, doubled for each earlier time-out that was
+    /// Returns the time-out of a step: 1.5 times the slowest answer plus a margin, doubled for each earlier time-out that was
     /// too short.
-    fn usual(&self, extensions: u8) -> Duration {
-        self.stretched(MIN_STEP_TIMEOUT.max(self.pause).max(self.slowest() * 3 / 2 + HOST_MARGIN), extensions)
+    fn step_timeout(&self, extensions: u8) -> Duration {
+        self.extended(MIN_STEP_TIMEOUT.max(self.pause).max(self.slowest() * 3 / 2 + HOST_MARGIN), extensions)
     }
 
-    /// The time-out for an expected answer.
-    fn check(&self, extensions: u8) -> Duration {
-        self.stretched(MIN_CHECK_TIMEOUT.max(self.usual(0) * 4), extensions)
+    /// Returns the time-out for an expected answer.
+    fn check_timeout(&self, extensions: u8) -> Duration {
+        self.extended(MIN_CHECK_TIMEOUT.max(self.step_timeout(0) * 4), extensions)
     }
 
-    fn stretched(&self, length: Duration, extensions: u8) -> Duration {
+    fn extended(&self, length: Duration, extensions: u8) -> Duration {
         length.saturating_mul(2u32.saturating_pow(extensions.into())).min(self.timeout.max(MIN_STEP_TIMEOUT))
     }
 }
@@ -72,7 +72,7 @@ impl Lss<'_, '_> {
     /// several slaves, give each one a node-ID before the next scan, or use [`Lss::fastscan_beside`].
     ///
     /// All slaves are switched to waiting state first. The found address is confirmed by inquiry. If the slave does not
-    /// support that, it is confirmed by selective addressing.
+    /// support this, the address is confirmed by selective addressing.
     ///
     /// # Errors
     /// Slaves answer, but no address can be confirmed; the bus failed or the user interrupted.
@@ -80,8 +80,8 @@ impl Lss<'_, '_> {
         self.fastscan_beside(&[], None)
     }
 
-    /// Switches all slaves to waiting state, and asks those without a node-ID for an answer. Does not wait for it: see
-    /// [`Lss::is_anyone_unconfigured`]. Returns the moment of the request.
+    /// Switches all slaves to waiting state, and asks the slaves without a node-ID to answer. Does not wait for the
+    /// answer: see [`Lss::is_anyone_unconfigured`]. Returns the moment of the request.
     ///
     /// # Errors
     /// The bus failed or the user interrupted.
@@ -92,8 +92,8 @@ impl Lss<'_, '_> {
     }
 
     /// Whether a slave without a node-ID has answered since [`Lss::ask_unconfigured`], or answers within `timeout`
-    /// after that moment. A silent bus is asked again, but not before 200 ms, for slaves that need pauses; the second
-    /// answer has at least half of this time.
+    /// after that moment. If no slave answers within 200 ms, the request is repeated, because some slaves need pauses. The
+    /// wait for the second answer is at least 100 ms.
     ///
     /// # Errors
     /// The bus failed or the user interrupted.
@@ -119,32 +119,32 @@ impl Lss<'_, '_> {
         Ok(true)
     }
 
-    /// Like [`Lss::fastscan`], but ignores the slaves in `aside`. They are switched to configuration state:
+    /// Like [`Lss::fastscan`], but ignores the slaves in `excluded`. They are switched to configuration state:
     /// slaves in this state do not take part in fastscan (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that
     /// takes part anyway is found again.
     ///
-    /// `all_slaves` is the wait for an answer of any slave, for example if the slaves answered quickly before. Without
-    /// it, the time-out is used, and without an answer the scan is repeated with pauses.
+    /// `all_slaves` is the wait for an answer of any slave, for example if the slaves answered quickly before. If it is
+    /// `None`, the time-out is used, and a scan without an answer is repeated with pauses.
     ///
     /// # Errors
-    /// As [`Lss::fastscan`], or a slave in `aside` does not answer.
+    /// As [`Lss::fastscan`], or a slave in `excluded` does not answer.
     pub fn fastscan_beside(
         &mut self,
-        aside: &[LssAddress],
+        excluded: &[LssAddress],
         all_slaves: Option<Duration>,
     ) -> Result<Option<LssAddress>, LssError> {
-        match self.scan_with_pauses(aside, Duration::ZERO, all_slaves)? {
+        match self.scan_with_pauses(excluded, Duration::ZERO, all_slaves)? {
             None if self.master.timing.retries > 0 && all_slaves.is_none() => {
-                self.scan_with_pauses(aside, RETRY_PAUSE, None)
+                self.scan_with_pauses(excluded, RETRY_PAUSE, None)
             }
             found => Ok(found),
         }
     }
 
-    /// A fastscan with at least this time between two frames.
+    /// Runs a fastscan with at least `pause` between two frames.
     fn scan_with_pauses(
         &mut self,
-        aside: &[LssAddress],
+        excluded: &[LssAddress],
         pause: Duration,
         all_slaves: Option<Duration>,
     ) -> Result<Option<LssAddress>, LssError> {
@@ -157,7 +157,7 @@ impl Lss<'_, '_> {
             if step.wait == Wait::AllSlaves {
                 self.switch_global(Mode::Waiting)?;
                 self.is_configuring = true;
-                for address in aside {
+                for address in excluded {
                     self.switch_selective(address)?;
                 }
                 self.pause(pause)?;
@@ -168,10 +168,10 @@ impl Lss<'_, '_> {
             match scan.on_end(answers) {
                 Progress::Continue => {}
                 Progress::NoneFound => {
-                    self.is_configuring = !aside.is_empty();
+                    self.is_configuring = !excluded.is_empty();
                     return Ok(None);
                 }
-                Progress::Found(address) if aside.is_empty() => {
+                Progress::Found(address) if excluded.is_empty() => {
                     return self.confirm(address, &pace).map(|()| Some(address));
                 }
                 Progress::Found(address) => return self.readdress(address).map(|()| Some(address)),
@@ -180,14 +180,14 @@ impl Lss<'_, '_> {
         }
     }
 
-    /// Carries out one step. `all_slaves` is the wait for an answer of any slave, if it is not the time-out.
+    /// Carries out one step, and returns the number of answers. `all_slaves` is as in [`Lss::fastscan_beside`].
     fn step(&mut self, step: Step, pace: &mut Pace, all_slaves: Option<Duration>) -> Result<usize, LssError> {
         let sent = self.send_now(step.request.frame())?;
-        let usual = sent + pace.usual(step.extensions);
+        let usual = sent + pace.step_timeout(step.extensions);
         let mut deadline = match step.wait {
             Wait::AllSlaves => sent + all_slaves.unwrap_or(pace.timeout),
             Wait::Advance => sent + pace.timeout,
-            Wait::Check => sent + pace.check(step.extensions),
+            Wait::Check => sent + pace.check_timeout(step.extensions),
             Wait::Bit => usual,
         };
         let mut answers = 0;
@@ -197,7 +197,7 @@ impl Lss<'_, '_> {
             }
             let at = received.at.mono;
             answers += 1;
-            pace.note(at.since(sent));
+            pace.record(at.since(sent));
             deadline = match step.wait {
                 Wait::AllSlaves => deadline.min(end_of_gathering(sent, at)),
                 _ if step.until_timeout => deadline.min(usual.max(at)),
@@ -208,16 +208,16 @@ impl Lss<'_, '_> {
     }
 
     fn confirm(&mut self, found: LssAddress, pace: &Pace) -> Result<(), LssError> {
-        match self.inquire_address_within(pace.check(0), 0) {
+        match self.inquire_address_within(pace.check_timeout(0), 0) {
             Ok(reported) if reported == found => Ok(()),
             Ok(reported) => Err(LssError::AddressMismatch { found, reported }),
-            // The service is optional. If the answer was lost or late, selective addressing decides too.
+            // The service is optional, and the answer may be lost or late. So selective addressing decides.
             Err(LssError::NoAnswer { .. }) => self.readdress(found),
             Err(error) => Err(error),
         }
     }
 
-    /// Addresses the slave that was found. If it answers, it has this address and is the only one in configuration
+    /// Selects the found slave by its address. If it answers, it has this address and is the only one in configuration
     /// state.
     fn readdress(&mut self, found: LssAddress) -> Result<(), LssError> {
         self.switch_global(Mode::Waiting)?;
@@ -225,7 +225,7 @@ impl Lss<'_, '_> {
     }
 }
 
-/// When all slaves have answered, estimated from the slowest answer so far.
+/// Estimates when all slaves have answered, from the slowest answer so far.
 fn end_of_gathering(sent: Mono, answered: Mono) -> Mono {
     answered + GATHERING_TIME.max(answered.since(sent))
 }

@@ -54,8 +54,8 @@ fn bus(stations: impl IntoIterator<Item = Tuned>) -> MemoryBus {
     bus
 }
 
-/// Frames and faults up to `until`, each with its number of consecutive repetitions.
-fn seen(bus: &mut MemoryBus, until: Mono) -> Vec<(String, u32)> {
+/// Receives frames and faults up to `until`, and counts equal ones in succession.
+fn events_until(bus: &mut MemoryBus, until: Mono) -> Vec<(String, u32)> {
     let mut seen: Vec<(String, u32)> = Vec::new();
     loop {
         let text = match bus.receive(until).expect("a memory bus never fails") {
@@ -75,7 +75,7 @@ fn received(bus: &MemoryBus, index: usize) -> usize {
     bus.stations::<Tuned>().nth(index).map_or(0, |station| station.script.received.len())
 }
 
-fn own(text: &str, times: u32) -> (String, u32) {
+fn counted(text: &str, times: u32) -> (String, u32) {
     (text.to_owned(), times)
 }
 
@@ -85,10 +85,15 @@ fn without_a_receiver_no_frame_is_acknowledged() {
     for stations in [vec![], vec![tuned(Tuning::Off, &[(10, "701#00")])]] {
         let mut bus = bus(stations);
         bus.send(&frame("080#")).expect("room");
-        let events = seen(&mut bus, us(100_000));
+        let events = events_until(&mut bus, us(100_000));
         assert_eq!(
             events[..4],
-            [own("NoAcknowledge", 12), own("ErrorWarning", 1), own("NoAcknowledge", 4), own("ErrorPassive", 1)]
+            [
+                counted("NoAcknowledge", 12),
+                counted("ErrorWarning", 1),
+                counted("NoAcknowledge", 4),
+                counted("ErrorPassive", 1)
+            ]
         );
         // The retries continue, but the state does not get worse.
         assert_eq!(events.len(), 5);
@@ -97,7 +102,7 @@ fn without_a_receiver_no_frame_is_acknowledged() {
         assert!(matches!(bus.send(&frame("080#")), Err(BusError::QueueFull)));
         // As soon as a station acknowledges, all frames are sent.
         bus.attach(tuned(Tuning::At(BIT_RATE), &[]));
-        seen(&mut bus, seconds(1));
+        events_until(&mut bus, seconds(1));
         assert_eq!(received(&bus, bus.stations::<Tuned>().count() - 1), QUEUE_LENGTH);
     }
 }
@@ -106,26 +111,26 @@ fn without_a_receiver_no_frame_is_acknowledged() {
 fn a_device_at_a_different_bit_rate_receives_nothing_and_makes_the_program_bus_off() {
     let mut bus = bus([tuned(Tuning::At(125_000), &[])]);
     bus.send(&frame("080#")).expect("room");
-    let events = seen(&mut bus, seconds(1));
+    let events = events_until(&mut bus, seconds(1));
     assert_eq!(
         events,
         [
-            own("Protocol", 12),
-            own("ErrorWarning", 1),
-            own("Protocol", 4),
-            own("ErrorPassive", 1),
-            own("Protocol", 16),
-            own("BusOff", 1)
+            counted("Protocol", 12),
+            counted("ErrorWarning", 1),
+            counted("Protocol", 4),
+            counted("ErrorPassive", 1),
+            counted("Protocol", 16),
+            counted("BusOff", 1)
         ]
     );
     assert_eq!(received(&bus, 0), 0);
     // Bus-off lasts until the interface is set up again. The other stations have no influence.
     bus.attach(tuned(Tuning::At(BIT_RATE), &[(2_000_000, "701#00")]));
-    assert_eq!(seen(&mut bus, seconds(3)), []);
+    assert_eq!(events_until(&mut bus, seconds(3)), []);
     bus.stations_mut::<Tuned>().skip(1).for_each(|station| station.tuning = Tuning::Off);
     bus.set_bit_rate(125_000, Mode::Normal).expect("allowed");
     bus.send(&frame("081#")).expect("room");
-    seen(&mut bus, seconds(4));
+    events_until(&mut bus, seconds(4));
     assert_eq!((received(&bus, 0), bus.bit_rate()), (1, Some(125_000)));
     assert_eq!(bus.stations::<Tuned>().next().map(|station| station.bus_rates.clone()), Some(vec![250_000, 125_000]));
 }
@@ -134,17 +139,17 @@ fn a_device_at_a_different_bit_rate_receives_nothing_and_makes_the_program_bus_o
 fn frames_of_a_device_at_a_different_bit_rate_are_errors_for_the_others() {
     let mut bus =
         bus([tuned(Tuning::At(125_000), &[(0, "701#00")]), tuned(Tuning::At(BIT_RATE), &[(1_000_000, "702#00")])]);
-    let events = seen(&mut bus, us(900_000));
-    assert_eq!(events, [own("Protocol", 32)], "until the one that is alone with its rate is bus-off");
+    let events = events_until(&mut bus, us(900_000));
+    assert_eq!(events, [counted("Protocol", 32)], "until the one that is alone with its rate is bus-off");
     assert_eq!(received(&bus, 1), 0);
     // Frames of the other station do not arrive.
-    assert_eq!(seen(&mut bus, seconds(2)), [own("Protocol", 32)]);
+    assert_eq!(events_until(&mut bus, seconds(2)), [counted("Protocol", 32)]);
     // After 128 errors a station is error-passive and no longer disturbs the frames of the others.
     for round in 0..4 {
         bus.set_bit_rate(BIT_RATE, Mode::Normal).expect("allowed");
         bus.send(&frame("080#")).expect("room");
         let until = bus.now().mono + Duration::from_secs(1);
-        let is_off = seen(&mut bus, until).contains(&own("BusOff", 1));
+        let is_off = events_until(&mut bus, until).contains(&counted("BusOff", 1));
         assert_eq!((is_off, received(&bus, 1)), (round < 3, usize::from(round == 3)), "round {round}");
     }
 }
@@ -157,24 +162,24 @@ fn stations_at_one_bit_rate_communicate_and_listen_only_disturbs_none() {
     ]);
     bus.set_bit_rate(500_000, Mode::ListenOnly).expect("allowed");
     assert!(matches!(bus.send(&frame("080#")), Err(BusError::ReceiveOnly(_))));
-    assert_eq!(seen(&mut bus, us(400_000)), [own("Protocol", 1)]);
+    assert_eq!(events_until(&mut bus, us(400_000)), [counted("Protocol", 1)]);
     assert_eq!(received(&bus, 1), 1);
     bus.set_bit_rate(125_000, Mode::ListenOnly).expect("allowed");
-    assert_eq!(seen(&mut bus, seconds(1)), [own("702#00", 1)]);
+    assert_eq!(events_until(&mut bus, seconds(1)), [counted("702#00", 1)]);
     // A station at the wrong rate that is not listen-only disturbs the frames.
     bus.set_bit_rate(500_000, Mode::Normal).expect("allowed");
-    assert_eq!(seen(&mut bus, seconds(2)), [own("Protocol", 32)]);
+    assert_eq!(events_until(&mut bus, seconds(2)), [counted("Protocol", 32)]);
 }
 
 #[test]
 fn listen_only_receives_no_valid_frame_of_a_single_sender() {
     let mut bus = bus([tuned(Tuning::At(125_000), &[(0, "701#00")])]);
     bus.set_bit_rate(125_000, Mode::ListenOnly).expect("allowed");
-    let events = seen(&mut bus, us(100_000));
+    let events = events_until(&mut bus, us(100_000));
     assert!(events.iter().all(|(text, _)| text != "701#00") && events[0].0 == "Protocol", "{events:?}");
     // The sender still retries; a station that acknowledges receives the frame.
     bus.set_bit_rate(125_000, Mode::Normal).expect("allowed");
-    assert_eq!(seen(&mut bus, seconds(1)), [own("701#00", 1)]);
+    assert_eq!(events_until(&mut bus, seconds(1)), [counted("701#00", 1)]);
 }
 
 #[test]
@@ -182,7 +187,7 @@ fn stations_that_follow_the_bit_rate_receive_all_frames() {
     let mut bus = bus([tuned(Tuning::Follows, &[(500_000, "701#00")]), tuned(Tuning::At(125_000), &[])]);
     bus.set_bit_rate(125_000, Mode::Normal).expect("allowed");
     bus.send(&frame("080#")).expect("room");
-    assert_eq!(seen(&mut bus, seconds(1)), [own("701#00", 1)]);
+    assert_eq!(events_until(&mut bus, seconds(1)), [counted("701#00", 1)]);
     assert_eq!((received(&bus, 0), received(&bus, 1)), (1, 2));
 }
 
@@ -192,10 +197,10 @@ fn simultaneous_frames_merge_if_equal_and_collide_if_not() {
         tuned(Tuning::Follows, &[(0, "7E4#44"), (1000, "585#01"), (500_000, "181#")]),
         tuned(Tuning::Follows, &[(0, "7E4#44"), (1000, "585#02")]),
     ]);
-    let events = seen(&mut bus, us(400_000));
+    let events = events_until(&mut bus, us(400_000));
     let frames: Vec<&(String, u32)> = events.iter().filter(|(text, _)| text.contains('#')).collect();
-    assert_eq!(frames, [&own("7E4#44", 1), &own("585#01", 1), &own("585#02", 1)], "{events:?}");
-    assert_eq!(events[1], own("Protocol", 16), "as long as both are error-active");
+    assert_eq!(frames, [&counted("7E4#44", 1), &counted("585#01", 1), &counted("585#02", 1)], "{events:?}");
+    assert_eq!(events[1], counted("Protocol", 16), "as long as both are error-active");
     let sent = bus.stations::<Tuned>().map(|station| station.script.sent.len());
     assert_eq!(sent.collect::<Vec<_>>(), [2, 2]);
 }

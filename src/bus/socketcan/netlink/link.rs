@@ -1,8 +1,8 @@
-//! The description of a CAN interface by the kernel (linux/can/netlink.h), and its settings.
+//! Parses the kernel's description of a CAN interface (linux/can/netlink.h), and builds requests that set it.
 
 use super::message::{Attributes, Header, NAME, Request, u16_at, u32_at};
 
-/// `IFF_UP`: switched on by the administrator.
+/// `IFF_UP`: the flag of an interface that is up.
 const UP: u32 = 1;
 /// `ARPHRD_CAN`.
 const CAN_HARDWARE: u16 = 280;
@@ -18,8 +18,8 @@ const RESTART_MS: u16 = 6;
 const ERROR_COUNTERS: u16 = 8;
 const FIXED_RATES: u16 = 13;
 const RATE_MAX: u16 = 15;
-const CONTROL_MODE_MORE: u16 = 17;
-/// `IFLA_CAN_CTRLMODE_SUPPORTED`, inside of [`CONTROL_MODE_MORE`].
+const CONTROL_MODE_EXTENSION: u16 = 17;
+/// `IFLA_CAN_CTRLMODE_SUPPORTED`, inside [`CONTROL_MODE_EXTENSION`].
 const SUPPORTED: u16 = 1;
 /// `CAN_CTRLMODE_LISTENONLY`.
 const LISTEN_ONLY: u32 = 2;
@@ -56,7 +56,7 @@ impl State {
         }
     }
 
-    /// Its name in lower case, as `ip` shows it.
+    /// Returns the name in lower case, as `ip` shows it.
     pub fn as_str(self) -> &'static str {
         match self {
             State::ErrorActive => "error-active",
@@ -94,18 +94,18 @@ impl BitTiming {
         })
     }
 
-    /// The bit timing that the kernel computes for this bit rate.
+    /// Returns a request for this bit rate. The kernel computes the bit timing.
     pub(in super::super) fn of_rate(bit_rate: u32) -> BitTiming {
         BitTiming { bit_rate, sample_point: 0, quantum: 0, segments: [0; 4] }
     }
 
-    /// This bit timing as a request. The kernel accepts either a bit rate or time quanta.
+    /// Returns this bit timing as a request. The kernel accepts either a bit rate or time quanta.
     pub(in super::super) fn again(self) -> BitTiming {
         if self.quantum == 0 { BitTiming::of_rate(self.bit_rate) } else { BitTiming { bit_rate: 0, ..self } }
     }
 
     fn bytes(self) -> Vec<u8> {
-        // The kernel computes the prescaler, the last value.
+        // The last value is the prescaler, which the kernel computes.
         let [propagation, phase1, phase2, jump] = self.segments;
         [self.bit_rate, self.sample_point, self.quantum, propagation, phase1, phase2, jump, 0]
             .into_iter()
@@ -117,13 +117,13 @@ impl BitTiming {
 /// A network interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Link {
-    /// Its index in the kernel.
+    /// The index in the kernel.
     pub(super) index: i32,
-    /// Its name. An interface may have further names (altname).
+    /// The primary name. An interface may have other names (altname).
     pub name: String,
     /// Whether it carries CAN frames.
     pub is_can: bool,
-    /// Whether it is switched on.
+    /// Whether it is up.
     pub up: bool,
     /// The kind: `can` is a controller, `vcan` and `vxcan` are virtual. `None` if it has no kind.
     pub kind: Option<String>,
@@ -150,10 +150,10 @@ impl Link {
     pub(super) fn read(header: Header, attributes: Attributes<'_>) -> Link {
         let info = attributes.nested(LINK_INFO);
         let kind = info.and_then(|info| info.text(INFO_KIND));
-        // The attributes of other kinds have other meanings.
+        // The attributes have these meanings only in an interface of the kind `can`.
         let can = info.filter(|_| kind == Some("can")).and_then(|info| info.nested(INFO_DATA));
         let mode = |data: &[u8]| u32_at(data, 4).map(|flags| flags & LISTEN_ONLY != 0);
-        let supported = can.and_then(|can| can.nested(CONTROL_MODE_MORE)?.u32(SUPPORTED));
+        let supported = can.and_then(|can| can.nested(CONTROL_MODE_EXTENSION)?.u32(SUPPORTED));
         let timing = can.and_then(|can| BitTiming::read(can.get(BIT_TIMING)?));
         let rates = can.and_then(|can| can.get(FIXED_RATES)).map(|data| data.as_chunks::<4>().0);
         Link {
@@ -185,12 +185,12 @@ impl Link {
         self.kind.as_deref() == Some("can")
     }
 
-    /// A request that switches the interface on or off.
+    /// Returns a request that switches the interface on or off.
     pub(super) fn switch(&self, up: bool) -> Request {
         Request::set(self.index, u32::from(up), UP)
     }
 
-    /// A request that sets bit timing and listen-only mode.
+    /// Returns a request that sets bit timing and listen-only mode.
     pub(super) fn configure(&self, timing: BitTiming, listen_only: Option<bool>) -> Request {
         let mut request = Request::set(self.index, 0, 0);
         request.nest(LINK_INFO, |request| {

@@ -1,5 +1,5 @@
 //! Encodes and decodes rtnetlink messages: a header, a fixed part, attributes (linux/netlink.h, linux/rtnetlink.h), in
-//! host byte order. Decoding is total: invalid parts are skipped.
+//! host byte order. Invalid parts are skipped without an error.
 
 /// `NLMSG_ERROR`: an acknowledgement (0) or an error.
 const ERROR: u16 = 2;
@@ -11,41 +11,41 @@ const GET_LINK: u16 = 18;
 const REQUEST: u16 = 1;
 /// `NLM_F_ACK`: requests an acknowledgement.
 const ACK: u16 = 4;
-/// `NLM_F_CAPPED`: an error does not repeat the request beyond its header.
+/// `NLM_F_CAPPED`: an error repeats only the header of the request.
 const CAPPED: u16 = 0x100;
 /// `NLM_F_ACK_TLVS`: attributes follow an error.
 const EXPLAINED: u16 = 0x200;
 /// `NLMSGERR_ATTR_MSG`: the message of the kernel.
-const WORDS: u16 = 1;
+const MESSAGE: u16 = 1;
 /// `IFLA_IFNAME`.
 pub(super) const NAME: u16 = 3;
-/// The flag bits of an attribute's type: nested, network byte order.
-const KIND: u16 = 0x3fff;
-/// The length of `nlmsghdr`, which equals that of `ifinfomsg`.
-const HEADER: usize = 16;
+/// The bits of an attribute's type without its flags (nested, network byte order).
+const KIND_MASK: u16 = 0x3fff;
+/// The length of `nlmsghdr` and of `ifinfomsg` in bytes.
+const HEADER_LENGTH: usize = 16;
 
 /// A request under construction.
 #[derive(Debug)]
 pub(super) struct Request(Vec<u8>);
 
 impl Request {
-    /// A request for one interface by one of its names.
+    /// Returns a request for the description of an interface, by one of its names.
     pub(super) fn get(name: &str) -> Request {
         let mut request = Request::new(GET_LINK, REQUEST, 0, 0, 0);
         request.attribute(NAME, &[name.as_bytes(), &[0]].concat());
         request
     }
 
-    /// Sets the interface with this index: the flags in `change`, and the attributes added later.
+    /// Returns a request that sets an interface: the flags in the mask `change`, and the attributes added later.
     pub(super) fn set(index: i32, flags: u32, change: u32) -> Request {
         Request::new(NEW_LINK, REQUEST | ACK, index, flags, change)
     }
 
-    fn new(kind: u16, how: u16, index: i32, flags: u32, change: u32) -> Request {
-        // Length and sequence number are set later, the port by the kernel.
-        let mut bytes = vec![0; HEADER];
+    fn new(kind: u16, message_flags: u16, index: i32, flags: u32, change: u32) -> Request {
+        // `finish` sets the length and the sequence number, the kernel sets the port.
+        let mut bytes = vec![0; HEADER_LENGTH];
         bytes[4..6].copy_from_slice(&kind.to_ne_bytes());
-        bytes[6..8].copy_from_slice(&how.to_ne_bytes());
+        bytes[6..8].copy_from_slice(&message_flags.to_ne_bytes());
         // Any address family and hardware type.
         bytes.extend_from_slice(&[0; 4]);
         bytes.extend_from_slice(&index.to_ne_bytes());
@@ -83,11 +83,11 @@ impl Request {
 /// An answer of the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reply<'a> {
-    /// Done.
+    /// The request was carried out.
     Done,
     /// Rejected: the error number, and the message of the kernel if there is one.
     Refused(i32, Option<&'a str>),
-    /// An interface.
+    /// The description of an interface.
     Link(Header, Attributes<'a>),
 }
 
@@ -104,17 +104,17 @@ pub(super) struct Header {
 
 /// Finds the reply with this sequence number; `None` if there is none.
 pub(super) fn reply(mut bytes: &[u8], sequence: u32) -> Option<Reply<'_>> {
-    while let Some(header) = bytes.first_chunk::<HEADER>() {
+    while let Some(header) = bytes.first_chunk::<HEADER_LENGTH>() {
         let length = usize::try_from(u32_at(header, 0)?).ok()?;
-        let body = bytes.get(HEADER..length)?;
-        let (kind, how) = (u16_at(header, 4)?, u16_at(header, 6)?);
+        let body = bytes.get(HEADER_LENGTH..length)?;
+        let (kind, message_flags) = (u16_at(header, 4)?, u16_at(header, 6)?);
         if u32_at(header, 8)? == sequence {
             match kind {
-                ERROR => return refusal(body, how),
+                ERROR => return parse_error(body, message_flags),
                 NEW_LINK => {
                     let index = i32::from_ne_bytes(*body.get(4..)?.first_chunk()?);
                     let header = Header { hardware: u16_at(body, 2)?, index, flags: u32_at(body, 8)? };
-                    return Some(Reply::Link(header, Attributes(body.get(HEADER..)?)));
+                    return Some(Reply::Link(header, Attributes(body.get(HEADER_LENGTH..)?)));
                 }
                 _ => {}
             }
@@ -124,16 +124,20 @@ pub(super) fn reply(mut bytes: &[u8], sequence: u32) -> Option<Reply<'_>> {
     None
 }
 
-/// Parses an error: a negative error number, the header or all of the request, the message.
-fn refusal(body: &[u8], how: u16) -> Option<Reply<'_>> {
+/// Parses an error: a negative error number, the header or the whole request, and attributes with the message.
+fn parse_error(body: &[u8], message_flags: u16) -> Option<Reply<'_>> {
     let code = i32::from_ne_bytes(*body.first_chunk()?);
     if code == 0 {
         return Some(Reply::Done);
     }
-    let repeated = if how & CAPPED == 0 { usize::try_from(u32_at(body, 4)?).ok()?.next_multiple_of(4) } else { HEADER };
-    let attributes = body.get(repeated.saturating_add(4)..).filter(|_| how & EXPLAINED != 0);
-    let words = attributes.and_then(|attributes| Attributes(attributes).text(WORDS));
-    Some(Reply::Refused(code.saturating_neg(), words))
+    let request_length = if message_flags & CAPPED == 0 {
+        usize::try_from(u32_at(body, 4)?).ok()?.next_multiple_of(4)
+    } else {
+        HEADER_LENGTH
+    };
+    let attributes = body.get(request_length.saturating_add(4)..).filter(|_| message_flags & EXPLAINED != 0);
+    let message = attributes.and_then(|attributes| Attributes(attributes).text(MESSAGE));
+    Some(Reply::Refused(code.saturating_neg(), message))
 }
 
 /// A sequence of attributes.
@@ -171,7 +175,7 @@ impl<'a> Iterator for Attributes<'a> {
         let (length, kind) = (u16_at(self.0, 0)?, u16_at(self.0, 2)?);
         let data = self.0.get(4..usize::from(length))?;
         self.0 = self.0.get(usize::from(length).next_multiple_of(4)..).unwrap_or_default();
-        Some((kind & KIND, data))
+        Some((kind & KIND_MASK, data))
     }
 }
 

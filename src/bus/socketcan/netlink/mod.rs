@@ -15,12 +15,13 @@ use std::io::{self, Read};
 use std::os::fd::{AsRawFd, RawFd};
 use std::time::Duration;
 
-/// `SOL_NETLINK`, `NETLINK_CAP_ACK` and `NETLINK_EXT_ACK`: errors without a copy of the request, and with a message.
+/// `SOL_NETLINK`, `NETLINK_CAP_ACK` and `NETLINK_EXT_ACK`: errors contain a message
+/// and no copy of the request.
 const LEVEL: i32 = 270;
 const CAPPED: i32 = 10;
 const EXPLAINED: i32 = 11;
-/// The largest message of the kernel.
-const LARGEST: usize = 32 * 1024;
+/// The largest message of the kernel in bytes.
+const MAX_MESSAGE: usize = 32 * 1024;
 /// The kernel answers immediately. With this limit, a fault cannot block the program.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
@@ -40,7 +41,7 @@ impl From<io::Error> for Refusal {
 }
 
 impl Refusal {
-    /// The number of the error.
+    /// Returns the error number.
     pub(super) fn code(&self) -> Option<i32> {
         self.error.raw_os_error()
     }
@@ -81,12 +82,16 @@ impl Kernel {
         Ok(kernel)
     }
 
-    /// Sends a request and passes its answer to `take`.
-    fn ask<T>(&self, request: Request, take: impl FnOnce(Reply<'_>) -> Result<T, Refusal>) -> Result<T, Refusal> {
+    /// Sends a request and converts the reply with `convert`.
+    fn exchange<T>(
+        &self,
+        request: Request,
+        convert: impl FnOnce(Reply<'_>) -> Result<T, Refusal>,
+    ) -> Result<T, Refusal> {
         // One request per connection, so the number is arbitrary.
         const SEQUENCE: u32 = 1;
         self.0.send(&request.finish(SEQUENCE))?;
-        let mut bytes = vec![0; LARGEST];
+        let mut bytes = vec![0; MAX_MESSAGE];
         loop {
             let length = match (&self.0).read(&mut bytes) {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
@@ -97,7 +102,7 @@ impl Kernel {
                     let words = words.map(str::to_owned);
                     return Err(Refusal { error: io::Error::from_raw_os_error(code), words });
                 }
-                Some(reply) => return take(reply),
+                Some(reply) => return convert(reply),
                 None => {}
             }
         }
@@ -106,7 +111,7 @@ impl Kernel {
 
 /// Reads an interface by name.
 pub(super) fn get(name: &str) -> Result<Link, Refusal> {
-    Kernel::open()?.ask(Request::get(name), |reply| match reply {
+    Kernel::open()?.exchange(Request::get(name), |reply| match reply {
         Reply::Link(header, attributes) => Ok(Link::read(header, attributes)),
         _ => Err(io::Error::from(io::ErrorKind::InvalidData).into()),
     })
@@ -123,7 +128,7 @@ pub(super) fn configure(link: &Link, timing: BitTiming, listen_only: Option<bool
 }
 
 fn set(request: Request) -> Result<(), Refusal> {
-    Kernel::open()?.ask(request, |reply| match reply {
+    Kernel::open()?.exchange(request, |reply| match reply {
         Reply::Done => Ok(()),
         _ => Err(io::Error::from(io::ErrorKind::InvalidData).into()),
     })

@@ -28,7 +28,7 @@ const BUSY: &str = "24000000020000010100000076000000f0ffffff54000000100005000100
 /// An acknowledgement.
 const DONE: &str = "240000000200000101000000760000000000000060000000100005000100000000000000";
 
-/// The captures are from a little-endian machine.
+/// Converts a capture from hexadecimal digits. The captures are from a little-endian machine.
 fn captured(hex: &str) -> Vec<u8> {
     let nibbles: Vec<u8> = hex.chars().map(|c| u8::try_from(c.to_digit(16).unwrap()).unwrap()).collect();
     nibbles.as_chunks::<2>().0.iter().map(|[high, low]| high << 4 | low).collect()
@@ -121,7 +121,7 @@ fn an_interface_is_requested_by_name() {
     assert_eq!(request[32..], *b"\x09\x00\x03\x00can0\0\0\0\0");
 }
 
-/// Parsing must not panic for any bytes.
+/// Parses any bytes, which must not panic.
 fn read(bytes: &[u8]) {
     if let Some(Reply::Link(header, attributes)) = reply(bytes, 1) {
         let link = Link::read(header, attributes);
