@@ -16,16 +16,16 @@
 //!   many transfers in parallel.
 //! - [`measure`] → device, canopen, bus (time types). Converts frames and answers to samples: decoding, status,
 //!   statistics, expressions. It sends and receives nothing.
-//! - [`node`] → master, measure, device, canopen, bus (the trait). One node: its identity, signals and TPDOs, and
-//!   the ways to read it, write it and wait for it.
-//! - [`sim`] → bus, device, canopen (values). Simulated devices. They follow the standard and the manuals, and do
-//!   not use the encoders of the client.
+//! - [`node`] → master, measure, device, canopen, bus (the trait). One node: its identity, signals and TPDOs, and the
+//!   ways to read it, write it and wait for it.
+//! - [`sim`] → bus, device, canopen (values). Simulated devices. They follow the standard and the manuals, and do not
+//!   use the encoders of the client.
 //! - [`tasks`] → node, measure, master, device, canopen, bus (the trait). The procedures of the commands: set a
 //!   node-ID, map a TPDO, record, check. They return typed reports and typed failures, and print nothing.
 //! - [`publish`] → bus (files, time types). Sends recordings to databases and brokers, in its own threads. The names
 //!   and cells of recordings and line protocol are always built; the rest needs the feature `publish`.
-//! - [`output`] → tasks (reports), publish (reports), node, measure, device, canopen (values), bus (time types, faults).
-//!   All sentences, tables and file formats. Part of the feature `cli`.
+//! - [`output`] → tasks (reports), publish (reports), node, measure, device, canopen (values), bus (time types,
+//!   faults). All sentences, tables and file formats. Part of the feature `cli`.
 //! - [`cli`] → tasks, output, publish, node, measure, master, sim, bus, device, canopen (values). Arguments and help
 //!   texts, one file for each command. Part of the feature `cli`.
 //!

@@ -143,8 +143,8 @@ pub trait BitRateControl {
         self.can_set_bit_rate()
     }
 
-    /// Restores the bit rate, mode and up/down state from before the first [`BitRateControl::set_bit_rate`]. Does nothing if
-    /// the bit rate was not set.
+    /// Restores the bit rate, mode and up/down state from before the first [`BitRateControl::set_bit_rate`]. Does
+    /// nothing if the bit rate was not set.
     ///
     /// # Errors
     /// The interface cannot be restored; the error describes its state.

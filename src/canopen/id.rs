@@ -1,7 +1,7 @@
 //! Node-IDs and CAN identifiers. Their constructors check the range.
 //!
-//! The predefined connection set follows CiA 301, 7.3.3: function code in bits 10 to 7, node-ID in bits 6 to 0. The
-//! LSS identifiers follow CiA 305.
+//! The predefined connection set follows CiA 301, 7.3.3: function code in bits 10 to 7, node-ID in bits 6 to 0. The LSS
+//! identifiers follow CiA 305.
 
 use std::collections::HashMap;
 use std::fmt;

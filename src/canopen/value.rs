@@ -262,8 +262,8 @@ impl Value {
 }
 
 impl fmt::Display for Value {
-    /// Prints integers in decimal, bytes in hexadecimal, and text unchanged. A real is printed as the shortest text that
-    /// parses to the same number.
+    /// Prints integers in decimal, bytes in hexadecimal, and text unchanged. A real is printed as the shortest text
+    /// that parses to the same number.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Value::Bool(bit) => write!(f, "{}", u8::from(*bit)),

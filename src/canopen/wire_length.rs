@@ -50,7 +50,7 @@ pub fn bit_time(bits: u32, bit_rate: u32) -> Duration {
     Duration::from_nanos(u64::from(bits) * 1_000_000_000 / u64::from(bit_rate.max(1)))
 }
 
-/// Returns the arbitration field in wire order, left-aligned. If two frames start at the same time, the smaller number wins.
+/// Returns the arbitration field in wire order, left-aligned. If two frames start together, the smaller number wins.
 pub fn priority(frame: &Frame) -> u32 {
     let remote = u32::from(frame.is_remote());
     match frame.id() {

@@ -212,8 +212,8 @@ impl ActiveTransfer {
         if matches!(error, TransferError::Violation(Violation::Crc, _)) {
             return self.request.operation() == Operation::Read && self.request.falls_back();
         }
-        // A segmented request would get the same abort code about the object. A write with an unknown answer is not repeated,
-        // because it may have had an effect.
+        // A segmented request would get the same abort code about the object. A write with an unknown answer is not
+        // repeated, because it may have had an effect.
         let refused = match error {
             TransferError::Aborted(code) => !is_about_object(code),
             TransferError::Violation(..) => self.request.operation() == Operation::Read,
@@ -275,8 +275,8 @@ impl ActiveTransfer {
     }
 }
 
-/// Whether the server has started a block transfer that was not requested, because a bit of the request was changed. The
-/// server would treat the next requests as part of this transfer.
+/// Whether the server has started a block transfer that was not requested, because a bit of the request was changed.
+/// The server would treat the next requests as part of this transfer.
 pub(super) fn begins_blocks(error: TransferError) -> bool {
     let TransferError::Violation(Violation::Command, frame) = error else { return false };
     frame.data().first().is_some_and(|command| matches!(command & 0xe1, 0xa0 | 0xc0))

@@ -1,14 +1,14 @@
 //! Detects another master on the same SDO channel.
 //!
 //! An SDO server carries out one transfer at a time. If another master starts a segmented transfer during our transfer,
-//! the server continues with the new transfer. A segment does not identify its transfer. So our next seven bytes may come
-//! from another object, or from the start of the object.
+//! the server continues with the new transfer. A segment does not identify its transfer. So our next seven bytes may
+//! come from another object, or from the start of the object.
 //!
 //! Two kinds of frames show such a transfer. Each received request is foreign, because a bus does not return our own
 //! frames. And the server announces each segmented transfer that it starts.
 //!
-//! If such frames are received, our transfer waits until the foreign transfer has ended, and then restarts. A foreign expedited
-//! transfer between two of our segments is harmless: the server continues or aborts our transfer.
+//! If such frames are received, our transfer waits until the foreign transfer has ended, and then restarts. A foreign
+//! expedited transfer between two of our segments is harmless: the server continues or aborts our transfer.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
@@ -123,8 +123,8 @@ impl ForeignTraffic {
             }
     }
 
-    /// Makes our transfer wait for the end of the foreign transfer. Returns `false` if our transfer has already
-    /// waited for `limit`.
+    /// Makes our transfer wait for the end of the foreign transfer. Returns `false` if our transfer has already waited
+    /// for `limit`.
     pub(super) fn back_off(&mut self, now: Mono, limit: Duration) -> bool {
         let since = *self.since.get_or_insert(now);
         let others = ForeignTraffic { seen: false, in_segments: false, ..*self };

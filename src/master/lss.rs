@@ -220,9 +220,9 @@ impl<'bus> Lss<'_, 'bus> {
         self.ask_one(Exchange::new(request), self.master.timing.retries).map(|_| ())
     }
 
-    /// Activates the new bit rate (15h). The slaves in configuration state stop sending for
-    /// `delay_ms`, change the bit rate, and wait for `delay_ms` again. Slaves do not answer. The command that
-    /// switches them back to waiting state must be sent at the new bit rate.
+    /// Activates the new bit rate (15h). The slaves in configuration state stop sending for `delay_ms`, change the bit
+    /// rate, and wait for `delay_ms` again. Slaves do not answer. The command that switches them back to waiting state
+    /// must be sent at the new bit rate.
     ///
     /// # Errors
     /// The bus failed or the user interrupted.

@@ -107,7 +107,7 @@ pub struct Master<'bus> {
     receives_all: bool,
     /// Whether answers to our transfers are returned as frames too.
     delivers_answers: bool,
-    /// Whether received frames are kept from the SDO client. See [`Master::exchange`].
+    /// Whether received frames are not passed to the SDO client. See [`Master::exchange`].
     bypasses_sdo: bool,
     outgoing: Outgoing,
     /// A frame that was received after the deadline. It is handled next.
@@ -119,7 +119,7 @@ pub struct Master<'bus> {
 }
 
 impl<'bus> Master<'bus> {
-    /// A master on `bus`.
+    /// Creates a master on `bus`.
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
         let (sdo, filters, outgoing) = (SdoClient::default(), Filters::All, Outgoing::new());
         let (receives_all, delivers_answers, bypasses_sdo) = (false, false, false);
@@ -202,24 +202,24 @@ impl<'bus> Master<'bus> {
         self.outgoing.push(frame, None);
     }
 
-    /// Queues a frame before all waiting frames, so that a SYNC does not wait for SDO requests. Not queued (`false`) if
-    /// the previous frame still waits.
+    /// Queues a frame before all waiting frames, so that a SYNC does not wait for SDO requests. Returns `false` and
+    /// queues nothing if an equal frame is already the next one.
     pub fn send_first(&mut self, frame: Frame) -> bool {
         self.outgoing.push_first(frame)
     }
 
-    /// When the bus accepted the frame of [`Master::send_first`], returned once. `None` if it still waits or was
+    /// Returns once when the bus accepted the frame of [`Master::send_first`]. `None` if the frame still waits or was
     /// dropped.
     pub fn take_first_at(&mut self) -> Option<Mono> {
         self.outgoing.take_first_at()
     }
 
-    /// Removes the frame of [`Master::send_first`] from the queue; `true` if it was not sent yet.
+    /// Removes the frame of [`Master::send_first`] from the queue. Returns `true` if it was not sent yet.
     pub fn remove_first(&mut self) -> bool {
         self.outgoing.remove_first()
     }
 
-    /// The number of frames that the kernel dropped and that no event reported. See [`Bus::late_drops`].
+    /// Returns the number of frames that the kernel dropped and that no event reported. See [`Bus::late_drops`].
     pub fn late_drops(&mut self) -> u32 {
         self.bus.late_drops()
     }
@@ -241,7 +241,7 @@ impl<'bus> Master<'bus> {
         self.sdo.accept_60(node, quirks.contains(&Quirk::UploadAnswered60));
     }
 
-    /// The nodes with heartbeats of a length other than one byte, and the length of the first one.
+    /// Returns the nodes that sent heartbeats of a length other than one byte, and the length of the first of these.
     pub fn unusual_heartbeats(&self) -> impl Iterator<Item = (NodeId, usize)> {
         self.sdo.unusual_heartbeats()
     }
@@ -290,7 +290,7 @@ impl<'bus> Master<'bus> {
         !self.outgoing.is_empty()
     }
 
-    /// Drops transfers without an abort, for example those of a scan. Their answers are ignored.
+    /// Drops transfers without an abort, for example at the end of a scan. Their answers are ignored.
     pub fn forget(&mut self, tickets: impl Iterator<Item = Ticket>) {
         for ticket in tickets {
             self.sdo.forget(ticket);
@@ -307,7 +307,7 @@ impl<'bus> Master<'bus> {
             self.outgoing.push(frame, None);
         }
         let now = self.now();
-        // If the bus is gone, the aborts are lost.
+        // If the bus has failed, the aborts are lost.
         let _ = self.outgoing.flush(self.bus, now, self.timing.timeout, &mut |_, _| {});
     }
 
@@ -407,8 +407,8 @@ impl<'bus> Master<'bus> {
         }
     }
 
-    /// Sends the frames that can be sent now; returns when to try again. It reads the clock only if there is something
-    /// to send, because on some machines that is a system call.
+    /// Sends the frames that can be sent now. Returns when to try again. The clock is read only if there is something
+    /// to send, because on some machines each reading needs a system call.
     fn send_waiting(&mut self) -> Result<Option<Mono>, Error> {
         if !self.sdo.can_start() && self.outgoing.is_empty() {
             return Ok(None);
@@ -433,26 +433,26 @@ impl<'bus> Master<'bus> {
         requests: Vec<Request>,
         watch: &mut dyn FnMut(&Received),
     ) -> Result<Vec<Result<Answer, SdoError>>, Error> {
-        let what: Vec<_> = requests.iter().map(|item| (item.node, item.object, item.operation())).collect();
+        let targets: Vec<_> = requests.iter().map(|item| (item.node, item.object, item.operation())).collect();
         let tickets: Vec<Ticket> = requests.into_iter().map(|request| self.start(request)).collect();
         let mut results: Vec<Option<Result<Answer, SdoError>>> = tickets.iter().map(|_| None).collect();
         let far = Mono::at(Duration::MAX);
         while results.iter().any(Option::is_none) {
             match self.next(far)? {
                 Happening::Sdo(ticket, result) => {
-                    let Some(at) = tickets.iter().position(|&mine| mine == ticket) else { continue };
+                    let Some(index) = tickets.iter().position(|&own| own == ticket) else { continue };
                     let silent =
                         result.as_ref().err().filter(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }));
                     if let Some(silent) = silent.map(|error| error.node) {
-                        for (rest, &(node, object, operation)) in what.iter().enumerate() {
-                            if node == silent && rest != at && results[rest].is_none() {
-                                self.forget(std::iter::once(tickets[rest]));
+                        for (other, &(node, object, operation)) in targets.iter().enumerate() {
+                            if node == silent && other != index && results[other].is_none() {
+                                self.forget(std::iter::once(tickets[other]));
                                 let failure = SdoFailure::Cancelled;
-                                results[rest] = Some(Err(SdoError { node, object, operation, failure }));
+                                results[other] = Some(Err(SdoError { node, object, operation, failure }));
                             }
                         }
                     }
-                    results[at] = Some(result);
+                    results[index] = Some(result);
                 }
                 Happening::Frame(received) => watch(&received),
                 Happening::Interrupted => {
@@ -470,10 +470,10 @@ impl<'bus> Master<'bus> {
                 | Happening::Deadline => {}
             }
         }
-        if what.iter().any(|(_, _, operation)| *operation == Operation::Read) {
+        if targets.iter().any(|(_, _, operation)| *operation == Operation::Read) {
             self.await_second_answers(watch)?;
         }
-        for (result, &(node, object, operation)) in results.iter_mut().zip(&what) {
+        for (result, &(node, object, operation)) in results.iter_mut().zip(&targets) {
             if let (Some(Ok(_)), Some(failure)) = (&result, self.sdo.failure_of(node, object)) {
                 *result = Some(Err(SdoError::two_devices(node, object, operation, failure)));
             }

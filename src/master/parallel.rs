@@ -1,12 +1,13 @@
-//! Work on several nodes at the same time.
+//! Runs procedures for several nodes at the same time.
 
 use super::Master;
 use crate::bus::Filters;
 use crate::bus::parallel::in_parallel;
 
 impl Master<'_> {
-    /// Works on several items at the same time, each with a master of its own on the same bus. The items must concern
-    /// different nodes, and none may use LSS, which reaches all devices. The results have the order of the items.
+    /// Runs `work` for all items at the same time, each with its own master on the same bus. The items must belong to
+    /// different nodes, and `work` must not use LSS, which reaches all devices. The results have the order of the
+    /// items.
     pub fn in_parallel<T: Send, R: Send>(
         &mut self,
         items: Vec<T>,
@@ -26,7 +27,7 @@ impl Master<'_> {
             self.sdo.merge(sdo);
             results.push(result);
         }
-        // A bus that failed reports it at the next call as well.
+        // A failed bus reports its error again at the next call.
         let _ = self.bus.listen(if self.receives_all { &Filters::All } else { &self.filters });
         results
     }

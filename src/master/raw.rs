@@ -1,4 +1,4 @@
-//! Requests that no state machine sends: with a wrong command, a wrong toggle bit, a wrong length.
+//! Sends requests that no state machine sends: with a wrong command, a wrong toggle bit, a wrong length.
 
 use super::{Error, Happening, Master};
 use crate::bus::{BusError, Received};
@@ -7,10 +7,10 @@ use crate::canopen::id::CanId;
 use std::time::Duration;
 
 impl Master<'_> {
-    /// Sends a frame as it is, and waits for the first data frame with the identifier `answer`. `None` if there is none
-    /// within `timeout`. Frames that were received before are no answer.
+    /// Sends a frame as it is, and waits for the first data frame with the identifier `answer`. Returns `None` if there
+    /// is none within `timeout`. Frames that were received earlier are ignored.
     ///
-    /// The SDO client does not see these frames. No SDO transfer may be in progress.
+    /// The SDO client does not receive these frames. No SDO transfer may be in progress.
     ///
     /// # Errors
     /// The bus failed, or the user interrupted.
@@ -37,12 +37,12 @@ impl Master<'_> {
                 }
             }
             master.send(request);
-            master.first(answer, timeout, watch)
+            master.wait_for_frame(answer, timeout, watch)
         })
     }
 
-    /// Receives frames for this time, and ignores late answers to [`Master::exchange`]. The SDO client would take them
-    /// for those of a second device.
+    /// Receives frames for this time, and ignores late answers to [`Master::exchange`]. The SDO client would treat them
+    /// as answers from a second device.
     ///
     /// # Errors
     /// The bus failed, or the user interrupted.
@@ -54,7 +54,7 @@ impl Master<'_> {
         })
     }
 
-    fn first(
+    fn wait_for_frame(
         &mut self,
         answer: CanId,
         timeout: Duration,
@@ -75,7 +75,7 @@ impl Master<'_> {
         }
     }
 
-    /// The next event; `None` at the deadline.
+    /// Returns the next event; `None` at the deadline.
     fn next_raw(&mut self, until: crate::bus::Mono) -> Result<Option<Happening>, Error> {
         match self.next(until)? {
             Happening::Deadline | Happening::Ended => Ok(None),
@@ -85,7 +85,7 @@ impl Master<'_> {
         }
     }
 
-    /// Keeps received frames from the SDO client.
+    /// Runs `work` without passing received frames to the SDO client.
     fn outside_sdo<T>(&mut self, work: impl FnOnce(&mut Self) -> Result<T, Error>) -> Result<T, Error> {
         self.bypasses_sdo = true;
         let result = work(self);
@@ -110,7 +110,7 @@ mod tests {
         let (node, timeout) = (NodeId::MIN, Duration::from_millis(100));
         let id = CanId::sdo_response(node);
         master.start_transcript();
-        // No command specifier of a client.
+        // E0h is not a command specifier of a client.
         let request = Frame::full(CanId::sdo_request(node), [0xe0, 0x00, 0x10, 0, 0, 0, 0, 0]);
         let answer = master.exchange(request, id, timeout)?.map(|received| received.frame.to_string());
         assert_eq!(answer.as_deref(), Some("581#8000100001000405"));

@@ -1,6 +1,6 @@
-//! The times of the last frames of each node, for proofs that need several seconds of silence.
+//! Stores the times of the last frames of each node, to prove that a node was silent for several seconds.
 //!
-//! A command asks or listens in several steps. What it received in one step counts in the next ones too.
+//! A command sends requests or listens in several steps. Frames received in one step also count in the next steps.
 
 use super::Master;
 use crate::bus::{Mono, Received};
@@ -11,12 +11,12 @@ use crate::canopen::nmt::Life;
 /// The times of the last frames of one node.
 #[derive(Clone, Copy, Debug, Default)]
 struct Times {
-    /// Its last heartbeat or boot-up message.
+    /// The last heartbeat or boot-up message of the node.
     heartbeat: Option<Mono>,
-    /// Its last SDO answer.
+    /// The last SDO answer of the node.
     answer: Option<Mono>,
-    /// The last two requests to it, the latest one first.
-    asked: [Option<Mono>; 2],
+    /// The last two requests to the node, the later one first.
+    requests: [Option<Mono>; 2],
 }
 
 /// The times of the last frames of all nodes, and of LSS slaves without a node-ID.
@@ -52,26 +52,26 @@ impl ReceiveTimes {
 
     /// Records the first request of a transfer.
     pub(super) fn on_request(&mut self, node: NodeId, at: Mono) {
-        let asked = &mut self.node(node).asked;
-        *asked = [Some(at), asked[0]];
+        let requests = &mut self.node(node).requests;
+        *requests = [Some(at), requests[0]];
     }
 }
 
 impl Master<'_> {
-    /// Whether a heartbeat or a boot-up message of a node was received at this moment or later. The filters must let it
-    /// pass: all filters of [`Master::listen_to`] with this node do.
+    /// Whether a heartbeat or a boot-up message of a node was received at this moment or later. The filters must pass
+    /// these frames, as the filters of [`Master::listen_to`] for this node do.
     pub fn has_heartbeat_since(&self, node: NodeId, since: Mono) -> bool {
         self.sdo.receive_times.nodes[usize::from(node.get())].heartbeat >= Some(since)
     }
 
-    /// Whether an SDO answer of a node was received at this moment or later, also if its transfer was over by then.
+    /// Whether an SDO answer of a node was received at this moment or later, even if its transfer had ended before.
     pub fn has_answered_since(&self, node: NodeId, since: Mono) -> bool {
         self.sdo.receive_times.nodes[usize::from(node.get())].answer >= Some(since)
     }
 
-    /// When the node was asked for the last time, if it was asked at least twice since this moment.
+    /// Returns the time of the last request to the node, if there were at least two requests since this moment.
     pub fn asked_twice_since(&self, node: NodeId, since: Mono) -> Option<Mono> {
-        let [last, before] = self.sdo.receive_times.nodes[usize::from(node.get())].asked;
+        let [last, before] = self.sdo.receive_times.nodes[usize::from(node.get())].requests;
         last.filter(|_| before >= Some(since))
     }
 

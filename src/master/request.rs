@@ -47,29 +47,29 @@ enum Kind {
 }
 
 impl Request {
-    /// An SDO upload.
+    /// Creates an SDO upload.
     pub fn read(node: NodeId, object: ObjectId) -> Request {
         Request::new(node, object, Kind::Read)
     }
 
-    /// An SDO download of a plain value, which may be repeated.
+    /// Creates an SDO download of a plain value, which may be repeated.
     pub fn write(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Request {
         Request::new(node, object, Kind::Write { data, size })
     }
 
     fn new(node: NodeId, object: ObjectId, kind: Kind) -> Request {
         let (blocks, refused_blocks) = (Blocks::Never, false);
-        let limit = longest(object);
+        let limit = size_limit(object);
         Request { node, object, kind, timeout: None, repeatable: true, blocks, limit, refused_blocks, is_exact: false }
     }
 
-    /// Sets whether blocks are used; [`super::BlockMode`] chooses.
+    /// Sets how blocks are used. [`super::BlockMode`] chooses the value.
     pub fn blocks(mut self, blocks: Blocks) -> Request {
         self.blocks = blocks;
         self
     }
 
-    /// Never accepts a length other than the announced one. For content that is saved to a file.
+    /// Sets whether a length other than the announced one is a failure. Set it for content that is saved to a file.
     pub fn exact(mut self, is_exact: bool) -> Request {
         self.is_exact = is_exact;
         self
@@ -81,26 +81,26 @@ impl Request {
         self
     }
 
-    /// Never repeats the request: for signatures, and for scans that repeat it themselves.
+    /// Never repeats the request. For signatures, and for scans that repeat requests themselves.
     pub fn once(mut self) -> Request {
         self.repeatable = false;
         self
     }
 
-    /// Sets another time-out than that of the master, for example for storing.
+    /// Sets a time-out that differs from the time-out of the master, for example for storing.
     pub fn within(mut self, timeout: Duration) -> Request {
         self.timeout = Some(timeout);
         self
     }
 
-    /// The same request with the time-out of `other`. It may be repeated, even if `other` must not be. Exception: a
-    /// rejected block request was the first attempt, so it is not repeated.
+    /// Sets the time-out of `other`. The request may be repeated, even if `other` must not be. Exception: if `other`
+    /// was a rejected block request, this request is already the second attempt.
     pub(super) fn with_timing_of(mut self, other: &Request) -> Request {
         (self.timeout, self.repeatable) = (other.timeout, !other.refused_blocks);
         self
     }
 
-    /// Whether a failed transfer may be restarted. The download of a program may have had an effect.
+    /// Whether a failed transfer may be restarted. The download of a program may not: it may have had an effect.
     pub(super) fn may_restart(&self) -> bool {
         self.repeatable && (self.operation() == Operation::Read || !(0x1f00..=0x1fff).contains(&self.object.index))
     }
@@ -122,7 +122,7 @@ impl Request {
         }
     }
 
-    /// The error of this request.
+    /// Returns the error of this request with this failure.
     pub(super) fn error(&self, failure: SdoFailure) -> SdoError {
         SdoError { node: self.node, object: self.object, operation: self.operation(), failure }
     }
@@ -136,14 +136,15 @@ impl Request {
     }
 }
 
-/// The limit for an object that is a number. The widest number has 8 bytes; some devices send more, filled with zeros.
+/// The size limit in bytes for an object that is a number. The widest number has 8 bytes; some devices send more,
+/// filled with zeros.
 pub const NUMBER_LIMIT: usize = 16;
 
-/// The limit for an object that is read as text.
+/// The size limit in bytes for an object that is read as text.
 pub const TEXT_LIMIT: usize = 64 * 1024;
 
-/// The largest size of an object in bytes, from its index (CiA 301 and the device profiles).
-fn longest(object: ObjectId) -> usize {
+/// Returns the size limit of an object in bytes, according to its index (CiA 301 and the device profiles).
+fn size_limit(object: ObjectId) -> usize {
     match object.index {
         // Name and versions of the manufacturer.
         0x1008..=0x100a => 255,
@@ -206,7 +207,7 @@ pub enum SdoFailure {
     /// The device did not answer in time.
     #[error("no answer within {}{}{}", format_duration(*.waited), if *.started { " in the middle of the transfer" } else { "" }, received(.missed))]
     NoAnswer {
-        /// The longest wait for one answer.
+        /// The size_limit wait for one answer.
         waited: Duration,
         /// Whether the device answered before and then stopped.
         started: bool,
@@ -222,10 +223,10 @@ pub enum SdoFailure {
     /// A number was expected, but the object contains text or bytes.
     #[error("the value is not a number")]
     NotANumber,
-    /// Another master wrote the same object at the same time, so the acknowledgement may be for its write.
+    /// Another master wrote the same object at the same time, so the acknowledgement may be for the other write.
     #[error("acknowledged, but another master wrote the same object at the same time")]
     Ambiguous,
-    /// The length contradicts the announced one, or a segment in the middle is short.
+    /// The length differs from the announced length, or a segment in the middle is short.
     #[error("{}: {frame}", lengths(*.announced, *.delivered))]
     WrongLength {
         /// Bytes announced.
@@ -279,7 +280,7 @@ fn received(missed: &MissedAnswer) -> String {
 }
 
 impl Answer {
-    /// The value read, and a note if the device deviated from the protocol.
+    /// Returns the value read, and a note if the device deviated from the protocol.
     ///
     /// # Errors
     /// The bytes do not fit the type.

@@ -1,7 +1,7 @@
 //! Detects a second answer to one request: two devices with one node-ID, or a bridge that repeats frames.
 //!
-//! A server answers each request once, so a second answer shows two devices or a bridge. It is ignored if another master
-//! sent a request, or if the request was repeated: these requests have their own answers.
+//! A server answers each request once, so a second answer shows two devices or a bridge. The second answer is ignored
+//! if another master sent a request, or if the request was repeated, because then it may belong to the other request.
 
 use super::Master;
 use super::request::{Operation, SdoError, SdoFailure};
@@ -19,8 +19,8 @@ const FOREIGN_ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 /// The longest wait for a second answer.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
-/// The number of earlier answers that are kept to recognise their repetition.
-const HISTORY: usize = 16;
+/// The largest number of earlier answers that are stored, to recognise repeated answers.
+const MAX_HISTORY: usize = 16;
 
 /// The reaction if two devices answer with one node-ID.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,7 +44,7 @@ pub struct SecondAnswer {
 }
 
 impl SecondAnswer {
-    /// The object.
+    /// Returns the object of the request.
     pub(super) fn object(self) -> Option<ObjectId> {
         multiplexer(self.second.data())
     }
@@ -66,15 +66,15 @@ impl Master<'_> {
         self.sdo.on_two_devices == OnTwoDevices::Report
     }
 
-    /// The nodes that sent two answers to one request.
+    /// Returns the nodes that sent two answers to one request.
     pub fn second_answers(&self) -> Vec<(NodeId, SecondAnswer)> {
         self.sdo.second_answers().collect()
     }
 }
 
 impl SdoError {
-    /// The error of a transfer if two devices have the node-ID. It contains the request that got two answers. This may
-    /// be an earlier request.
+    /// Returns the error of a transfer if two devices have the node-ID. It contains the request that got two answers,
+    /// which may be an earlier request.
     pub(super) fn two_devices(node: NodeId, object: ObjectId, operation: Operation, failure: SdoFailure) -> SdoError {
         let answers = match &failure {
             SdoFailure::TwoDevices(Some(answers)) | SdoFailure::NotWritten(answers) => Some(*answers),
@@ -114,7 +114,7 @@ pub struct Answers {
 }
 
 impl Answers {
-    /// The two different answers, else the answer that arrived twice.
+    /// Returns the two different answers, or else the answer that arrived twice.
     pub fn finding(&self) -> Option<SecondAnswer> {
         self.finding
     }
@@ -130,17 +130,17 @@ impl Answers {
         is_first && (self.latest.is_none() || self.finding.is_some())
     }
 
-    /// The request for this object was repeated or dropped.
+    /// Records that the request for this object was repeated or dropped.
     pub fn on_repeated(&mut self, object: ObjectId) {
         self.repeated.insert(object);
     }
 
-    /// Another master sent a request.
+    /// Records a request of another master.
     pub(super) fn on_foreign_request(&mut self, at: Mono) {
         self.foreign_until = Some(at + FOREIGN_ANSWER_TIMEOUT);
     }
 
-    /// A frame was used as an answer; `asked_at` is given if it is the first one of its transfer.
+    /// Records a frame that was used as an answer. `asked_at` is given for the first frame of a transfer.
     pub fn on_answer(&mut self, frame: Frame, operation: Operation, asked_at: Option<Mono>, at: Mono) {
         self.latest = Some(frame);
         let Some(asked_at) = asked_at else { return };
@@ -148,7 +148,7 @@ impl Answers {
         self.is_single |= self.initial.is_some() && self.wait_until.is_none_or(|until| until <= at);
         self.initial = Some((frame, operation));
         self.history.push_back((frame, operation));
-        if self.history.len() > HISTORY {
+        if self.history.len() > MAX_HISTORY {
             self.history.pop_front();
         }
         let wait = (at.since(asked_at) * 2 + Duration::from_millis(2)).min(LONGEST_WAIT);
@@ -180,7 +180,7 @@ impl Answers {
         }
         // The second answer of a slow device may arrive after the answer to a later request.
         let is_same =
-            |answer: &Frame, operation| multiplexer(answer.data()) == object && answers(frame, operation, answer);
+            |answer: &Frame, operation| multiplexer(answer.data()) == object && could_answer(frame, operation, answer);
         let mut earlier = self.history.iter().rev().map(|&(answer, operation)| (answer, operation));
         let Some((first, _)) = earlier.find(|&(answer, operation)| object.is_some() && is_same(&answer, operation))
         else {
@@ -193,12 +193,12 @@ impl Answers {
         true
     }
 
-    /// How often this answer is in the history.
+    /// Returns how often this answer is in the history.
     fn count(&self, frame: &Frame) -> usize {
         self.history.iter().filter(|(answer, _)| answer == frame).count()
     }
 
-    /// The time until which a second answer may arrive; `None` if only one device has this node-ID.
+    /// Returns the time until which a second answer may arrive; `None` if only one device has this node-ID.
     pub(super) fn wait_until(&self) -> Option<Mono> {
         self.wait_until.filter(|_| !self.is_single || self.finding.is_some())
     }
@@ -213,9 +213,9 @@ impl Answers {
 }
 
 /// Whether a frame could answer the same request as `initial`.
-fn answers(frame: &Frame, operation: Operation, initial: &Frame) -> bool {
+fn could_answer(frame: &Frame, operation: Operation, initial: &Frame) -> bool {
     let command = |frame: &Frame| frame.data().first().copied().unwrap_or_default();
-    // A server may abort a segmented transfer that it began.
+    // A server may abort a segmented transfer that it began, so this abort is not a second answer.
     let is_whole = operation == Operation::Write || command(initial) & 0x02 != 0 || command(initial) == 0x80;
     match (command(frame), operation) {
         (0x80, _) => is_whole,
@@ -238,7 +238,7 @@ mod tests {
         text.parse().expect("a frame")
     }
 
-    /// Answers to one request each, at 10, 20, … ms.
+    /// Returns the record after one answer to each request, at 10, 20, … ms.
     fn after(answers: &[(&str, Operation)]) -> Answers {
         let mut log = Answers::default();
         for (at, &(text, operation)) in (1..).zip(answers) {

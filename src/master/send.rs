@@ -1,4 +1,5 @@
-//! The queue of frames to send. Sending is paced to the bit rate. A full transmit queue is retried.
+//! The queue of frames to send. Frames are sent no faster than the bit rate allows. If the transmit queue is full,
+//! sending is tried again.
 
 use super::{Ticket, Transcript};
 use crate::bus::{Bus, BusError, Mono};
@@ -27,9 +28,9 @@ pub(super) struct Outgoing {
     full_since: Option<Mono>,
     /// Whether a frame that cannot be sent is dropped without an error.
     tolerates_outages: bool,
-    /// The frame that was queued before all others, until it is sent.
+    /// The frame that was last queued by `push_first`, until it is sent.
     first: Option<Frame>,
-    /// When the bus accepted this frame.
+    /// When the bus accepted the last frame of `push_first`.
     first_at: Option<Mono>,
     /// Whether the moment before sending matters for a queued frame.
     is_timed: bool,
@@ -91,13 +92,13 @@ impl Outgoing {
         *self = Outgoing { tolerates_outages: self.tolerates_outages, transcript, ..Outgoing::new() };
     }
 
-    /// When the bus accepted the frame that was last queued before all others, returned once. `None` if it still waits
-    /// or was dropped.
+    /// Returns once when the bus accepted the last frame of `push_first`. `None` if the frame still waits or was
+    /// dropped.
     pub(super) fn take_first_at(&mut self) -> Option<Mono> {
         self.first_at.take()
     }
 
-    /// Removes the frame that was last queued before all others, if it still waits.
+    /// Removes the last frame of `push_first`, if it still waits.
     pub(super) fn remove_first(&mut self) -> bool {
         self.first.take().is_some_and(|frame| {
             let before = self.queue.len();
@@ -111,8 +112,8 @@ impl Outgoing {
     }
 
     /// Removes a waiting frame that does not belong to an SDO transfer.
-    pub(super) fn remove(&mut self, gone: &Frame) {
-        self.queue.retain(|(frame, ticket)| ticket.is_some() || frame != gone);
+    pub(super) fn remove(&mut self, removed: &Frame) {
+        self.queue.retain(|(frame, ticket)| ticket.is_some() || frame != removed);
     }
 
     /// Removes the frames of all SDO transfers.
@@ -121,8 +122,8 @@ impl Outgoing {
     }
 
     /// Removes the frames of one SDO transfer.
-    pub(super) fn drop_ticket(&mut self, gone: Ticket) {
-        self.queue.retain(|(_, ticket)| *ticket != Some(gone));
+    pub(super) fn drop_ticket(&mut self, removed: Ticket) {
+        self.queue.retain(|(_, ticket)| *ticket != Some(removed));
     }
 
     /// Sends all frames that can be sent now, and calls `sent` for each frame of a transfer, with a moment before and
@@ -149,7 +150,7 @@ impl Outgoing {
                     return Ok(Some(now + longest));
                 }
             }
-            let mut is_taken = true;
+            let mut is_accepted = true;
             match bus.send(frame) {
                 Ok(()) => {}
                 Err(BusError::QueueFull) => {
@@ -160,21 +161,21 @@ impl Outgoing {
                     if !self.tolerates_outages {
                         return Err(BusError::QueueFull);
                     }
-                    // No node acknowledges. When a node acknowledges again, the waiting frames would be too late.
+                    // No node acknowledges. The waiting frames are dropped, because they would be sent too late.
                     self.first = None;
                     self.queue.drain(..).filter_map(|(_, ticket)| ticket).for_each(|ticket| sent(ticket, [now; 2]));
                     self.full_since = None;
                     return Ok(None);
                 }
-                Err(BusError::Down(_) | BusError::NoInterface(_)) if self.tolerates_outages => is_taken = false,
+                Err(BusError::Down(_) | BusError::NoInterface(_)) if self.tolerates_outages => is_accepted = false,
                 Err(error) => return Err(error),
             }
-            if let Some(transcript) = self.transcript.as_mut().filter(|_| is_taken) {
+            if let Some(transcript) = self.transcript.as_mut().filter(|_| is_accepted) {
                 transcript.push(bus.mono(), true, *frame);
             }
             if ticket.is_none() && self.first == Some(*frame) {
                 self.first = None;
-                self.first_at = is_taken.then_some(now);
+                self.first_at = is_accepted.then_some(now);
             }
             if let Some(ticket) = ticket {
                 // On a bus that several procedures share (`bus::parallel`), sending may wait: the clock is read again.

@@ -23,7 +23,7 @@ pub struct Exchanged {
 pub struct Transcript {
     /// The first frames, at most 200.
     pub frames: Vec<Exchanged>,
-    /// The number of frames after these.
+    /// The number of later frames, which are not stored.
     pub omitted: usize,
 }
 

@@ -8,8 +8,8 @@
 //! | block download | `4 + s`, plus 1 for every 127 segments | 2, plus 1 for every 127 segments |
 //! | block upload | `5 + s`, plus 1 for every 127 segments | 3, plus 1 for every 127 segments |
 //!
-//! Block transfer needs fewer frames for more than 3 written segments or more than 4 read ones. With 28 bytes as the
-//! limit for both, it never needs more frames. A rejected block request costs two extra frames. Most sensors do not
+//! Block transfer needs fewer frames for more than 3 written segments or more than 4 read segments. With 28 bytes as
+//! the limit for both, it never needs more frames. A rejected block request costs two extra frames. Most sensors do not
 //! support block transfer. So it is used only if it saves frames: see [`BlockMode::Auto`].
 
 use super::request::NUMBER_LIMIT;
@@ -25,7 +25,7 @@ use std::time::Duration;
 pub const SMALL: u8 = 28;
 
 /// From this size in bytes (one full block), a segmented upload is aborted and restarted as a block upload. If the
-/// device rejects blocks, that costs 6 extra frames in at least 256.
+/// device rejects blocks, the restart costs 6 extra frames, where the transfer has at least 256 frames.
 pub const LARGE: u32 = 889;
 
 /// The interval between two progress reports of a transfer.
@@ -57,7 +57,7 @@ pub enum Blocks {
     /// An upload starts segmented. It restarts as [`Blocks::First`] if the device announces [`LARGE`] bytes or more. A
     /// download is never in blocks.
     WhenLarge,
-    /// In blocks; segmented if the device does not support it.
+    /// In blocks; segmented if the device does not support blocks.
     First {
         /// For an upload: up to this size in bytes, the server may answer segmented.
         threshold: u8,
@@ -73,12 +73,12 @@ pub enum TransferKind {
     Plain,
     /// In blocks.
     Blocks,
-    /// Expedited or segmented, after the device rejected blocks or did not answer the request for them.
+    /// Expedited or segmented, after the device rejected or did not answer the block request.
     PlainFallback,
 }
 
 impl BlockMode {
-    /// The choice for an upload of this type; `None` if the type is unknown.
+    /// Returns the choice for an upload of this type; pass `None` if the type is unknown.
     pub fn for_read(self, data_type: Option<DataType>) -> Blocks {
         match self {
             BlockMode::Never => Blocks::Never,
@@ -90,7 +90,7 @@ impl BlockMode {
         }
     }
 
-    /// The choice for a download of `length` bytes.
+    /// Returns the choice for a download of `length` bytes.
     pub fn for_write(self, length: usize) -> Blocks {
         match self {
             BlockMode::Never => Blocks::Never,
@@ -142,7 +142,7 @@ pub fn write_object(
 }
 
 impl Master<'_> {
-    /// Bytes of a transfer so far, and in total if known; `None` if it is not in progress.
+    /// Returns the bytes of a transfer so far, and in total if known; `None` if it is not in progress.
     pub fn moved(&self, ticket: Ticket) -> Option<Moved> {
         self.sdo.moved(ticket)
     }
@@ -173,7 +173,7 @@ impl Master<'_> {
         let ticket = self.start(request);
         // Uses the latest known moment, so that a short transfer does not read the clock.
         let mut report_at = self.seen + REPORT_INTERVAL;
-        let mut timed = false;
+        let mut has_updated_clock = false;
         loop {
             match self.next(report_at)? {
                 Happening::Sdo(ended, result) if ended == ticket => {
@@ -188,10 +188,10 @@ impl Master<'_> {
                 Happening::Frame(received) => watch(&received),
                 Happening::Deadline => {
                     // The first deadline only updates the clock.
-                    if let Some(moved) = self.moved(ticket).filter(|_| timed) {
+                    if let Some(moved) = self.moved(ticket).filter(|_| has_updated_clock) {
                         progress(moved);
                     }
-                    timed = true;
+                    has_updated_clock = true;
                     report_at = self.now() + REPORT_INTERVAL;
                 }
                 Happening::Interrupted => {

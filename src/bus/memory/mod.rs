@@ -187,8 +187,8 @@ impl MemoryBus {
         next.map(|moment| moment.max(self.now))
     }
 
-    /// Processes the next event if it happens no later than `limit`. Returns `false` if there was no such event:
-    /// then the time does not advance.
+    /// Processes the next event if it happens no later than `limit`. Returns `false` if there was no such event: then
+    /// the time does not advance.
     fn step(&mut self, limit: Mono) -> bool {
         let Some(moment) = self.next_event_time().filter(|moment| *moment <= limit) else { return false };
         self.now = moment;

@@ -19,8 +19,8 @@ pub trait Station: Any + Send {
     /// Does what is due at `now`, the moment of [`Station::next_wake`].
     fn wake(&mut self, now: Mono, out: &mut Outbox);
 
-    /// Returns when the station must be woken next. After [`Station::wake`] at `now`, this must be later than `now`; otherwise
-    /// time would stop. The value may change only in the other functions of this trait, or through
+    /// Returns when the station must be woken next. After [`Station::wake`] at `now`, this must be later than `now`;
+    /// otherwise time would stop. The value may change only in the other functions of this trait, or through
     /// [`super::MemoryBus::stations_mut`].
     fn next_wake(&self) -> Option<Mono>;
 
@@ -32,8 +32,8 @@ pub trait Station: Any + Send {
         Tuning::Follows
     }
 
-    /// Receives the bit rate of the bus in bit/s. Called before [`Station::power_on`], and when the program changes
-    /// the bit rate.
+    /// Receives the bit rate of the bus in bit/s. Called before [`Station::power_on`], and when the program changes the
+    /// bit rate.
     fn on_bus_bit_rate(&mut self, _bit_rate: u32) {}
 }
 

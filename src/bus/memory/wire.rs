@@ -95,7 +95,7 @@ impl MemoryBus {
             Tuning::At(rate) => Some(rate == bit_rate),
             Tuning::Off => None,
         };
-        // For each station that does not send: `true` if it receives at this bit rate, `false` if it disturbs the frame.
+        // For each station that does not send: `true` if it receives at this bit rate, `false` if it disturbs.
         let receiving: Vec<Option<bool>> = self
             .places
             .iter()

@@ -89,8 +89,8 @@ impl Firmware {
         }
     }
 
-    /// Returns the command for a bit rate: a digit after `S`, or the registers of the controller. `S7` and `S9` mean different
-    /// rates in different firmware.
+    /// Returns the command for a bit rate: a digit after `S`, or the registers of the controller. `S7` and `S9` mean
+    /// different rates in different firmware.
     pub(super) fn rate(&self, bit_rate: u32) -> Option<Rate> {
         // CAN232 and CANUSB have an SJA1000. USBtin has other registers.
         let has_registers = self.kind() == Kind::Lawicel && self.detail.is_none();

@@ -1,8 +1,8 @@
 //! Serial adapters with the LAWICEL protocol (slcan): CANable, CANtact, USBtin, CAN232, WiFi bridges.
 //!
-//! The adapters differ. Some answer each command, and some answer none. Some start two seconds after the port is opened. Many lose
-//! commands that arrive before the previous answer, so the next command waits for the answer. To an adapter that
-//! does not answer, frames are sent no faster than the bit rate allows.
+//! The adapters differ. Some answer each command, and some answer none. Some start two seconds after the port is
+//! opened. Many lose commands that arrive before the previous answer, so the next command waits for the answer. To an
+//! adapter that does not answer, frames are sent no faster than the bit rate allows.
 
 mod clock;
 mod firmware;

@@ -69,8 +69,8 @@ impl Batch {
         None
     }
 
-    /// Reads all waiting frames, up to [`BATCH`], and returns their number, which is never 0. If `wait` is
-    /// set, waits up to the socket's `SO_RCVTIMEO` for the first frame.
+    /// Reads all waiting frames, up to [`BATCH`], and returns their number, which is never 0. If `wait` is set, waits
+    /// up to the socket's `SO_RCVTIMEO` for the first frame.
     ///
     /// # Errors
     /// No frame is waiting, or the socket failed.
@@ -113,8 +113,8 @@ struct ControlInfo {
     lost: Option<u32>,
 }
 
-/// Parses timestamps and drop counter from the control messages of one frame. Each message has a header with a
-/// length (`size_t`, includes the header), a level and a type. It starts at a multiple of the size of `size_t`.
+/// Parses timestamps and drop counter from the control messages of one frame. Each message has a header with a length
+/// (`size_t`, includes the header), a level and a type. It starts at a multiple of the size of `size_t`.
 fn parse_control(mut control: &[u8]) -> ControlInfo {
     const WORD: usize = size_of::<usize>();
     let mut info = ControlInfo::default();

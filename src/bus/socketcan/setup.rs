@@ -1,5 +1,5 @@
-//! Switches interfaces on and off and sets their bit rates. Other settings stay unchanged. Each change
-//! is checked by reading the state back, and undone if it failed.
+//! Switches interfaces on and off and sets their bit rates. Other settings stay unchanged. Each change is checked by
+//! reading the state back, and undone if it failed.
 
 use super::netlink::{self, BitTiming, Link, Refusal};
 use crate::bus::{BusError, Mode};
@@ -7,8 +7,8 @@ use std::fs;
 
 /// The number of `CAP_NET_ADMIN`, the privilege to configure interfaces.
 const NET_ADMIN: u32 = 12;
-/// The accepted deviation of the actual bit rate, in parts per thousand. The bit rates of two nodes may differ by
-/// about 1 % in total.
+/// The accepted deviation of the actual bit rate, in parts per thousand. The bit rates of two nodes may differ by about
+/// 1 % in total.
 const TOLERANCE_PER_MILLE: u64 = 5;
 
 /// A change of an interface.
@@ -29,8 +29,8 @@ pub fn link(name: &str) -> Result<Link, BusError> {
     if link.is_can { Ok(link) } else { Err(BusError::NotCan(name.to_owned())) }
 }
 
-/// Switches an interface on. If `bit_rate` is given, also sets bit rate and mode: an interface that is up then goes down
-/// for a moment.
+/// Switches an interface on. If `bit_rate` is given, also sets bit rate and mode: an interface that is up then goes
+/// down for a moment.
 ///
 /// # Errors
 /// The kernel rejects the change. The interface is then unchanged.

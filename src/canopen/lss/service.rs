@@ -141,8 +141,8 @@ pub enum Request {
     Inquire(Part),
     /// 5Eh.
     InquireNodeId,
-    /// 46h to 4Bh: asks for slaves with this vendor-ID and product code, and with numbers in these ranges. Slaves answer
-    /// the last of the six requests.
+    /// 46h to 4Bh: asks for slaves with this vendor-ID and product code, and with numbers in these ranges. Slaves
+    /// answer the last of the six requests.
     Identify(Limit, u32),
     /// 4Ch: asks for slaves without a node-ID.
     IdentifyUnconfigured,

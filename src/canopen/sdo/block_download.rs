@@ -79,8 +79,8 @@ impl BlockDownload {
         }
     }
 
-    /// Counts a sent frame. A server never acknowledges unsent segments. So the number of sent segments
-    /// identifies a repeated acknowledgement of the previous block.
+    /// Counts a sent frame. A server never acknowledges unsent segments. So the number of sent segments identifies a
+    /// repeated acknowledgement of the previous block.
     pub fn on_sent(&mut self) {
         if let State::SubBlock { count, sent, .. } = &mut self.state {
             *sent = (*count).min(*sent + 1);

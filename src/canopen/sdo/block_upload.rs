@@ -60,9 +60,9 @@ enum State {
 }
 
 impl BlockUpload {
-    /// Creates an upload of `object` from `node`. `threshold` is the "protocol switch threshold" of the standard, 0 for none.
-    /// If the object has at most this many bytes, the server may answer expedited or segmented. For `accept_60` see
-    /// [`Upload::new`].
+    /// Creates an upload of `object` from `node`. `threshold` is the "protocol switch threshold" of the standard, 0 for
+    /// none. If the object has at most this many bytes, the server may answer expedited or segmented. For `accept_60`
+    /// see [`Upload::new`].
     pub fn new(node: NodeId, object: ObjectId, threshold: u8, accept_60: bool) -> BlockUpload {
         BlockUpload {
             node,

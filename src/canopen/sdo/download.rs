@@ -36,8 +36,8 @@ enum State {
 }
 
 impl Download {
-    /// Creates a download of `data` to `object` of `node`. One to four bytes are sent expedited, other sizes segmented. An
-    /// expedited transfer cannot indicate 0 bytes.
+    /// Creates a download of `data` to `object` of `node`. One to four bytes are sent expedited, other sizes segmented.
+    /// An expedited transfer cannot indicate 0 bytes.
     pub fn new(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Download {
         Download { node, object, data, size, state: State::Initiated }
     }

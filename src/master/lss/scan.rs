@@ -5,8 +5,8 @@ use crate::bus::Mono;
 use crate::canopen::lss::{Fastscan, LssAddress, Mode, Progress, Request, Step, Wait};
 use std::time::Duration;
 
-/// The shortest wait for an answer. Most steps of a scan take this time. If an answer arrives later, a part of the
-/// scan is repeated.
+/// The shortest wait for an answer. Most steps of a scan take this time. If an answer arrives later, a part of the scan
+/// is repeated.
 const MIN_STEP_TIMEOUT: Duration = Duration::from_millis(4);
 
 /// The shortest wait for an expected answer.
@@ -51,8 +51,8 @@ impl Pace {
         sorted[RECENT_ANSWERS - if self.count > 2 { 2 } else { 1 }]
     }
 
-    /// Returns the time-out of a step: 1.5 times the slowest answer plus a margin, doubled for each earlier time-out that was
-    /// too short.
+    /// Returns the time-out of a step: 1.5 times the slowest answer plus a margin, doubled for each earlier time-out
+    /// that was too short.
     fn step_timeout(&self, extensions: u8) -> Duration {
         self.extended(MIN_STEP_TIMEOUT.max(self.pause).max(self.slowest() * 3 / 2 + HOST_MARGIN), extensions)
     }
@@ -92,8 +92,8 @@ impl Lss<'_, '_> {
     }
 
     /// Whether a slave without a node-ID has answered since [`Lss::ask_unconfigured`], or answers within `timeout`
-    /// after that moment. If no slave answers within 200 ms, the request is repeated, because some slaves need pauses. The
-    /// wait for the second answer is at least 100 ms.
+    /// after that moment. If no slave answers within 200 ms, the request is repeated, because some slaves need pauses.
+    /// The wait for the second answer is at least 100 ms.
     ///
     /// # Errors
     /// The bus failed or the user interrupted.
@@ -119,9 +119,9 @@ impl Lss<'_, '_> {
         Ok(true)
     }
 
-    /// Like [`Lss::fastscan`], but ignores the slaves in `excluded`. They are switched to configuration state:
-    /// slaves in this state do not take part in fastscan (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that
-    /// takes part anyway is found again.
+    /// Like [`Lss::fastscan`], but ignores the slaves in `excluded`. They are switched to configuration state: slaves
+    /// in this state do not take part in fastscan (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that takes
+    /// part anyway is found again.
     ///
     /// `all_slaves` is the wait for an answer of any slave, for example if the slaves answered quickly before. If it is
     /// `None`, the time-out is used, and a scan without an answer is repeated with pauses.

@@ -15,8 +15,7 @@ use std::io::{self, Read};
 use std::os::fd::{AsRawFd, RawFd};
 use std::time::Duration;
 
-/// `SOL_NETLINK`, `NETLINK_CAP_ACK` and `NETLINK_EXT_ACK`: errors contain a message
-/// and no copy of the request.
+/// `SOL_NETLINK`, `NETLINK_CAP_ACK` and `NETLINK_EXT_ACK`: errors contain a message and no copy of the request.
 const LEVEL: i32 = 270;
 const CAPPED: i32 = 10;
 const EXPLAINED: i32 = 11;
