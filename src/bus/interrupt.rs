@@ -14,7 +14,7 @@ const MAX_SLEEP: Duration = Duration::from_secs(100 * 365 * 24 * 3600);
 /// Receives the signals SIGINT and SIGTERM.
 ///
 /// Each instance receives each signal that arrives during its lifetime, so two buses in one process both receive it.
-/// While an instance exists, Ctrl-C does not end the program. The owner of the instance must check for signals.
+/// After the first instance was created, Ctrl-C no longer ends the program. The owner must check for signals.
 #[derive(Debug)]
 pub struct Interrupts {
     /// Set after the byte of a signal is written to the pipe, so that a busy reader needs only one load.

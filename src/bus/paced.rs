@@ -116,7 +116,7 @@ impl<B: Bus> Paced<B> {
         Paced { bus, limit, bit_rate, channels, filters, load, requests, answers }
     }
 
-    /// Returns the COB-ID of the answer if `frame` is an SDO request to be counted. Aborts are not delayed.
+    /// Returns the COB-ID of the answer if `frame` is an SDO request. Aborts do not count: they must not be delayed.
     fn answer_of(&self, frame: &Frame) -> Option<CanId> {
         let is_abort = frame.data().first() == Some(&0x80);
         if frame.is_remote() || frame.len() != 8 || is_abort {

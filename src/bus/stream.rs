@@ -82,7 +82,7 @@ pub(super) trait Protocol {
         None
     }
 
-    /// Returns once why the other side rejected the last [`Protocol::set_channel`].
+    /// Returns why the other side rejected the last [`Protocol::set_channel`], and clears the reason.
     fn take_refusal(&mut self) -> Option<String> {
         None
     }

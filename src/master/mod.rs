@@ -208,8 +208,8 @@ impl<'bus> Master<'bus> {
         self.outgoing.push_first(frame)
     }
 
-    /// Returns once when the bus accepted the frame of [`Master::send_first`]. `None` if the frame still waits or was
-    /// dropped.
+    /// Returns the time at which the bus accepted the frame of [`Master::send_first`], and clears the time. `None` if
+    /// the frame still waits or was dropped.
     pub fn take_first_at(&mut self) -> Option<Mono> {
         self.outgoing.take_first_at()
     }

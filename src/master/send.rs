@@ -92,8 +92,8 @@ impl Outgoing {
         *self = Outgoing { tolerates_outages: self.tolerates_outages, transcript, ..Outgoing::new() };
     }
 
-    /// Returns once when the bus accepted the last frame of `push_first`. `None` if the frame still waits or was
-    /// dropped.
+    /// Returns the time at which the bus accepted the last frame of `push_first`, and clears the time. `None` if the
+    /// frame still waits or was dropped.
     pub(super) fn take_first_at(&mut self) -> Option<Mono> {
         self.first_at.take()
     }

@@ -269,7 +269,7 @@ fn unplugged_adapter_is_found_again() {
     use std::os::fd::AsRawFd;
     let folder = tempfile::tempdir().expect("a folder");
     let link = folder.path().join("adapter");
-    // Connects a simulated adapter. It is unplugged when the second value is dropped.
+    // Connects a simulated adapter. It is unplugged when both values are dropped.
     let plug = |link: std::path::PathBuf| {
         let (host, device) = SerialPort::pair().expect("a pseudo terminal");
         let name = std::fs::read_link(format!("/proc/self/fd/{}", device.as_raw_fd())).expect("a name");

@@ -160,7 +160,7 @@ impl SocketCan {
         let (batch, ready, socket) = (&mut self.batch, &mut self.ready, self.socket.as_fd());
         let result = work(&self.name, &mut || {
             ready.clear();
-            // Read twice, because one loop ends at the error "interface is down", which is reported only once.
+            // Read twice: the first loop may end at the error "interface is down", which is reported only once.
             while batch.fill(socket, false).is_ok() {}
             while batch.fill(socket, false).is_ok() {}
         });

@@ -16,7 +16,7 @@ pub struct Exchange {
     received: Vec<(Frame, Result<Answer, Violation>)>,
     /// The number of answers, including repeated ones.
     answer_count: usize,
-    /// The number of requests.
+    /// How often the requests were sent.
     request_count: usize,
 }
 

@@ -143,8 +143,8 @@ fn number(data: &[u8]) -> Option<u32> {
 /// An abort with the identifier of the request also counts. The D-20-9 manual (page 7) shows such an abort, and an
 /// abort of another master also ends the transfer.
 fn abort_of(frame: &Frame, node: NodeId, object: ObjectId) -> Option<AbortCode> {
-    let is_channel = frame.id() == CanId::sdo_response(node) || frame.id() == CanId::sdo_request(node);
+    let is_on_channel = frame.id() == CanId::sdo_response(node) || frame.id() == CanId::sdo_request(node);
     let data = frame.data();
-    (is_channel && data.first() == Some(&0x80) && multiplexer(data) == Some(object))
+    (is_on_channel && data.first() == Some(&0x80) && multiplexer(data) == Some(object))
         .then(|| AbortCode(number(data).unwrap_or(0)))
 }
