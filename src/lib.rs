@@ -1,7 +1,7 @@
 //! `cangauge`: find, configure, check and record CANopen measuring devices (CiA 404).
 //!
-//! This crate is a library and a command line program. A program that uses the library only needs
-//! `default-features = false`: the feature `cli` contains the command line and its dependencies.
+//! This crate is a library and a command line program. A program that uses only the library sets `default-features =
+//! false`, because the feature `cli` contains the command line and its dependencies.
 //!
 //! # Layers
 //!

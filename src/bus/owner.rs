@@ -3,7 +3,8 @@
 use std::fs::File;
 use std::io;
 
-/// Whether a file that the user did not name may be read. A process that runs as root reads only files of root.
+/// Whether the program may read a file that the user did not name. A process that runs as root reads only files of
+/// root.
 ///
 /// # Errors
 /// The owner of the file is unknown.

@@ -16,7 +16,7 @@ pub const SHARED_LOAD: u8 = 50;
 /// The bus load in percent that requests and their answers may always use, even if other traffic is heavier.
 const MIN_LOAD: u8 = 5;
 
-/// The load of other traffic in percent from which the bus counts as shared. Heartbeats alone stay below it.
+/// The bus counts as shared if other traffic has at least this load in percent. Heartbeats alone stay below it.
 const TRAFFIC_LOAD: u8 = 1;
 
 /// The bus counts as shared if the frames of other nodes would need more than this time at a load of [`TRAFFIC_LOAD`]

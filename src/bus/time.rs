@@ -3,7 +3,7 @@
 use std::ops::{Add, Sub};
 use std::time::{Duration, Instant, SystemTime};
 
-/// A moment on a bus's monotonic time line, counted from when the bus was opened.
+/// A moment on the monotonic time line of a bus: the time since the bus was opened.
 ///
 /// This is not a [`std::time::Instant`], because a simulated bus has a virtual clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -8,9 +8,9 @@ use std::str::FromStr;
 pub enum DataType {
     /// BOOLEAN: one byte in an SDO.
     Boolean,
-    /// UNSIGNED8 to UNSIGNED64, with its size in bytes: 1 to 8.
+    /// UNSIGNED8 to UNSIGNED64, with the size in bytes: 1 to 8.
     Unsigned(u8),
-    /// INTEGER8 to INTEGER64, with its size in bytes: 1 to 8.
+    /// INTEGER8 to INTEGER64, with the size in bytes: 1 to 8.
     Integer(u8),
     /// REAL32.
     Real32,

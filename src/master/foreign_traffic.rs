@@ -18,7 +18,7 @@ use std::time::Duration;
 /// A foreign transfer without frames for this time has ended.
 const IDLE_TIMEOUT: Duration = Duration::from_millis(50);
 
-/// The foreign traffic on the channel during one transfer of ours.
+/// The foreign traffic on the channel during one of our transfers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct ForeignTraffic {
     /// Whether any foreign frame was received.

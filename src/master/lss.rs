@@ -1,8 +1,8 @@
 //! LSS over a bus: sets node-ID and bit rate (CiA 305).
 //!
-//! A slave in configuration state also executes commands that are meant for another slave. So an
-//! [`Lss`] remembers whether a slave may be in that state. When the [`Lss`] is dropped, also after Ctrl-C, it switches
-//! all slaves to waiting state.
+//! A slave in configuration state also executes commands that are meant for another slave. So an [`Lss`] remembers
+//! whether a slave may be in that state. When the [`Lss`] is dropped, also after Ctrl-C, it switches all slaves to
+//! waiting state.
 
 mod error;
 mod scan;
@@ -27,7 +27,7 @@ const FRAME_PAUSE: Duration = Duration::from_millis(2);
 /// The pause between repeated frames, for slow slaves. python-canopen uses the same pause.
 const RETRY_PAUSE: Duration = Duration::from_millis(200);
 
-/// The wait for answers of further slaves after the first answer.
+/// The wait for answers from further slaves after the first answer.
 const FURTHER_ANSWERS_TIMEOUT: Duration = Duration::from_millis(20);
 
 /// The largest number of faults that are stored.
@@ -49,7 +49,7 @@ pub struct Gathered<T> {
     pub answers: Vec<T>,
     /// Whether more than one slave answered: the answers differ, or there were more answers than requests.
     pub has_several_slaves: bool,
-    /// Faults during the exchange. Slaves that send different answers at the same time cause them.
+    /// Faults during the exchange. Slaves that send different answers at the same time cause such faults.
     pub faults: Vec<Fault>,
 }
 
@@ -184,7 +184,7 @@ impl<'bus> Lss<'_, 'bus> {
     /// Reads the LSS address of the only slave in configuration state (5Ah to 5Dh).
     ///
     /// # Errors
-    /// No slave answers, several answer, or an answer violates the protocol.
+    /// No slave answers, several slaves answer, or an answer violates the protocol.
     pub fn inquire_address(&mut self) -> Result<LssAddress, LssError> {
         self.inquire_address_within(self.master.timing.timeout, self.master.timing.retries)
     }

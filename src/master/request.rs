@@ -207,7 +207,7 @@ pub enum SdoFailure {
     /// The device did not answer in time.
     #[error("no answer within {}{}{}", format_duration(*.waited), if *.started { " in the middle of the transfer" } else { "" }, received(.missed))]
     NoAnswer {
-        /// The size_limit wait for one answer.
+        /// The longest wait for one answer.
         waited: Duration,
         /// Whether the device answered before and then stopped.
         started: bool,

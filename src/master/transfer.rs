@@ -25,7 +25,7 @@ use std::time::Duration;
 pub const SMALL: u8 = 28;
 
 /// From this size in bytes (one full block), a segmented upload is aborted and restarted as a block upload. If the
-/// device rejects blocks, the restart costs 6 extra frames, where the transfer has at least 256 frames.
+/// device rejects blocks, the restart costs 6 extra frames; the transfer itself has at least 256.
 pub const LARGE: u32 = 889;
 
 /// The interval between two progress reports of a transfer.

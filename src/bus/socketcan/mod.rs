@@ -72,8 +72,8 @@ pub struct SocketCan {
     /// The identifiers to deliver, if they are too many for the kernel.
     wanted: Option<BTreeSet<CanId>>,
     timestamps: TimestampSource,
-    /// The bit rate, and whether the interface only listens. Read once while it stays up, because this takes several
-    /// system calls.
+    /// The bit rate, and whether the interface only listens. Read once while the interface stays up, because this takes
+    /// several system calls.
     controller: Cell<Option<(Option<u32>, bool)>>,
     /// The settings of the interface before its bit rate was set.
     original_link: Option<Link>,

@@ -112,7 +112,7 @@ pub struct Fastscan {
     number: u32,
     failed_checks: u8,
     restarts: u8,
-    /// Whether a step got several answers, or its answers may be late.
+    /// Whether a step got several answers, or answers may be late.
     has_several_answers: bool,
     /// How often the usual time-out was too short.
     extensions: u8,
@@ -120,7 +120,7 @@ pub struct Fastscan {
     has_passed_probe: bool,
     /// The number of answers to the impossible request.
     probe_answers: u8,
-    /// Whether a bit since the last check got no answer, which may still come.
+    /// Whether a bit since the last check got no answer. The answer may still arrive.
     has_missed_answers: bool,
 }
 

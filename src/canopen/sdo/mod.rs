@@ -73,7 +73,7 @@ pub enum Violation {
     /// The toggle bit of a segment did not alternate.
     #[error("toggle bit not alternated")]
     Toggle,
-    /// The transfer exceeds the limit of its size.
+    /// The transfer exceeds the size limit of the object.
     #[error("longer than the object can be, or without an end")]
     TooLong,
     /// The frame has too few bytes.
@@ -91,7 +91,7 @@ pub enum Violation {
     /// The CRC of a block transfer does not match the data.
     #[error("CRC does not match the data")]
     Crc,
-    /// The size differs from the announced one after segments were repeated.
+    /// The size differs from the announced size after segments were repeated.
     #[error("the size differs from the announced one after lost segments")]
     Size,
 }

@@ -120,7 +120,7 @@ impl Lss<'_, '_> {
     }
 
     /// Like [`Lss::fastscan`], but ignores the slaves in `excluded`. They are switched to configuration state: slaves
-    /// in this state do not take part in fastscan (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that takes
+    /// in this state do not take part in fastscan (CiA 305, 7.5.3.5). Their settings do not change. A slave that takes
     /// part anyway is found again.
     ///
     /// `all_slaves` is the wait for an answer of any slave, for example if the slaves answered quickly before. If it is
