@@ -18,14 +18,14 @@ pub struct AssignEntry {
     pub node_id: Option<AssignObject>,
     /// The object for the index of the bit rate.
     pub bit_rate: Option<AssignObject>,
-    /// Its own indices of the bit rates in bit/s; empty if it uses those of the device.
+    /// Bit rates in bit/s by index, if the method has its own indices. Empty: the table of the device applies.
     pub bit_rates: BTreeMap<u8, u32>,
-    /// The object that stores both, written with "save"; `None` if the device stores them by itself. LSS has its own
-    /// store service.
+    /// The object that stores node-ID and bit rate when "save" is written to it. `None`: the device stores them by
+    /// itself, or by the store service of LSS.
     pub store: Option<ObjectId>,
     /// When the new values take effect.
     pub applies: Applies,
-    /// Whether no document confirms this method. It is then used only if the user chooses it.
+    /// Whether no document confirms this method. An unverified method is used only if the user selects it.
     pub unverified: bool,
     /// Page or table of the manual.
     pub page: String,
@@ -34,7 +34,7 @@ pub struct AssignEntry {
 }
 
 impl AssignEntry {
-    /// LSS as in CiA 305, for devices of which nothing else is known.
+    /// LSS as in CiA 305, for devices without a description.
     pub fn lss() -> AssignEntry {
         AssignEntry {
             kind: AssignKind::Lss,
@@ -108,7 +108,7 @@ impl AssignObject {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RateTable {
     rates: BTreeMap<u8, u32>,
-    /// The index of automatic detection, if there is one.
+    /// The index that selects automatic bit rate detection, if the device has one.
     auto: Option<u8>,
     /// The origin of the table.
     pub source: RateSource,
@@ -119,16 +119,16 @@ pub struct RateTable {
 pub enum RateSource {
     /// The description of the device.
     Device,
-    /// The table of CiA 305, because that of the device is unknown.
+    /// The table of CiA 305, because the table of the device is unknown.
     Standard,
 }
 
-/// CiA 305, table 0. Index 5 is reserved. Index 9 is automatic detection, which a description must state.
+/// CiA 305, table 0. Index 5 is reserved. Index 9 (automatic detection) is used only if a description contains it.
 const STANDARD: [(u8, u32); 8] =
     [(0, 1_000_000), (1, 800_000), (2, 500_000), (3, 250_000), (4, 125_000), (6, 50_000), (7, 20_000), (8, 10_000)];
 
 impl RateTable {
-    /// The table of a device for a method, or the table of CiA 305 if that of the device is unknown.
+    /// Returns the table of a device for a method, or the table of CiA 305 if the table of the device is unknown.
     pub fn of(description: Option<&Description>, method: AssignKind) -> RateTable {
         let own = description.map(|description| description.bit_rates_of(method)).filter(|rates| !rates.is_empty());
         let auto = description.and_then(|description| description.auto_bit_rate);
@@ -148,7 +148,7 @@ impl RateTable {
         self.rates.get(&index).copied()
     }
 
-    /// The index of automatic detection, if the device has it.
+    /// The index that selects automatic bit rate detection, if the device has one.
     pub fn auto(&self) -> Option<u8> {
         self.auto
     }
@@ -161,7 +161,7 @@ impl RateTable {
     }
 }
 
-/// A bit rate in short form: `250k`, `1M`.
+/// Formats a bit rate in short form: `250k`, `1M`.
 pub fn short_bit_rate(bit_rate: u32) -> String {
     match bit_rate {
         mega if mega > 0 && mega.is_multiple_of(1_000_000) => format!("{}M", mega / 1_000_000),
@@ -176,7 +176,7 @@ impl Description {
         self.assign.iter().find(|entry| !entry.unverified)
     }
 
-    /// The bit rates in bit/s by their indices for a method; empty if they are unknown.
+    /// Returns the bit rates of a method in bit/s by index; empty if they are unknown.
     pub fn bit_rates_of(&self, method: AssignKind) -> &BTreeMap<u8, u32> {
         let own = self.assign_of_kind(method).map(|entry| &entry.bit_rates).filter(|rates| !rates.is_empty());
         own.unwrap_or(&self.bit_rates)

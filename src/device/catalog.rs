@@ -20,11 +20,11 @@ pub struct Model {
     pub description: Description,
     /// Its objects by address and by name.
     pub dictionary: Dictionary,
-    /// Objects whose type the description leaves open; they are read as bytes.
+    /// Objects without a data type in the description; they are read as bytes.
     pub untyped: BTreeSet<ObjectId>,
     /// The device of the description, and the device of each EDS file that was merged into it.
     pub made_for: Vec<TargetDevice>,
-    /// Warnings about objects, each with the index of its object.
+    /// Warnings about objects: the index of the object and the text.
     pub warnings: Vec<(u16, String)>,
 }
 
@@ -42,25 +42,25 @@ pub struct TargetDevice {
 }
 
 impl TargetDevice {
-    /// Whether a device may be of this kind: vendor and product agree. Unknown numbers are not compared.
+    /// Whether vendor and product of a device agree. Unknown numbers are not compared.
     pub fn fits(&self, vendor: Option<u32>, product: Option<u32>) -> bool {
-        same(self.vendor, vendor) && same(self.product, product)
+        agree_if_known(self.vendor, vendor) && agree_if_known(self.product, product)
     }
 
     /// Whether the revision of a device agrees. Unknown numbers are not compared.
     pub fn has_revision(&self, revision: Option<u32>) -> bool {
-        same(self.revision, revision)
+        agree_if_known(self.revision, revision)
     }
 }
 
-fn same(wanted: Option<u32>, found: Option<u32>) -> bool {
+fn agree_if_known(wanted: Option<u32>, found: Option<u32>) -> bool {
     match (wanted.filter(|&number| number != 0), found.filter(|&number| number != 0)) {
         (Some(wanted), Some(found)) => wanted == found,
         _ => true,
     }
 }
 
-/// The answers of a device about itself; `None` for an object that it did not answer.
+/// The identity that a device reports; `None` for an object that it did not answer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct IdentityAnswers {
     /// 1000h.
@@ -71,13 +71,13 @@ pub struct IdentityAnswers {
     pub product_code: Option<u32>,
     /// 1008h.
     pub device_name: Option<String>,
-    /// The objects that [`objects_to_read`] asked for, as received.
+    /// The received bytes of the objects that [`objects_to_read`] returned.
     pub answers: BTreeMap<ObjectId, Vec<u8>>,
 }
 
 impl Model {
-    /// Whether the process values have the types of CiA 404 and no scale of their own. Only such a description may be
-    /// used for a similar device of another vendor.
+    /// Whether all process values have the data types of CiA 404. Only then may the description be used for a similar
+    /// device of another vendor.
     pub fn has_standard_values(&self) -> bool {
         let mut entries = self.dictionary.iter();
         entries.all(|entry| {
@@ -110,7 +110,7 @@ impl Model {
         Ok(Model { description, dictionary, untyped: BTreeSet::new(), made_for: vec![made_for], warnings: Vec::new() })
     }
 
-    /// The objects and types of an EDS or DCF file. It has no signals: they are derived from the objects of CiA 404.
+    /// Creates a model from an EDS or DCF file. It has no signals: they are derived from the objects of CiA 404.
     pub fn from_eds(eds: &Eds) -> Model {
         let description = Description {
             name: "eds".to_owned(),
@@ -134,7 +134,7 @@ impl Model {
         }
     }
 
-    /// A description together with an EDS of the same device. If both have an object, the description has priority.
+    /// Adds the objects of an EDS file of the same device. If both have an object, the description has priority.
     #[must_use]
     pub fn with_eds(&self, eds: &Model) -> Model {
         let mut merged = self.clone();
@@ -146,7 +146,7 @@ impl Model {
         merged
     }
 
-    /// Whether the identity agrees with the description, as far as it can be compared without further reading.
+    /// Whether 1000h, 1018h and 1008h agree with the description. `is_confirmed` checks the other objects.
     fn has_identity(&self, traits: &IdentityAnswers) -> bool {
         fn agrees<T: PartialEq>(wanted: &Option<T>, found: &Option<T>) -> bool {
             wanted.is_none() || wanted == found
@@ -159,8 +159,8 @@ impl Model {
             && agrees(&wanted.device_name, &traits.device_name)
     }
 
-    /// Whether the objects that confirm the identity have the required values. Bytes beyond the type's width are
-    /// ignored: a server that omits the size sends four.
+    /// Whether the objects that confirm the identity have the required values. Bytes after the width of the type are
+    /// ignored, because a server that omits the size sends four bytes.
     fn is_confirmed(&self, traits: &IdentityAnswers) -> bool {
         self.description.identify.confirm.iter().all(|(&object, value)| {
             let wanted = self.dictionary.get(object).and_then(|entry| value.encode(entry.data_type, NodeId::MIN).ok());
@@ -171,7 +171,7 @@ impl Model {
         })
     }
 
-    /// Whether both descriptions recognise the same devices.
+    /// Whether both descriptions recognise the agree_if_known devices.
     pub fn is_for_the_same_device(&self, other: &Model) -> bool {
         let key = |model: &Model| {
             let identify = model.description.identify.clone();
@@ -226,7 +226,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
-/// The file of the built-in description with this name, with its comments.
+/// The text of the built-in description with this name, including its comments.
 pub fn text(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(other, _)| *other == name).map(|(_, text)| *text)
 }
@@ -239,8 +239,8 @@ pub fn by_name(name: &str) -> Option<Arc<Model>> {
     file(names().position(|other| other == name)?)
 }
 
-/// The description with this vendor-ID and product code, if there is exactly one. It is used for devices of which
-/// nothing else is known.
+/// The description with this vendor-ID and product code, if there is exactly one. It is used if nothing else about the
+/// device is known.
 pub fn by_identity(vendor: u32, product: u32) -> Option<Arc<Model>> {
     let wanted = (Some(vendor), Some(product));
     let mut fitting = all().filter(|model| {
@@ -255,15 +255,15 @@ pub fn has_vendor(vendor: u32) -> bool {
     built_in().iter().any(|model| model.description.identify.vendor_id == Some(vendor))
 }
 
-/// The objects that must be read before [`recognise`] can decide. Empty if they are not needed, or if no description
-/// can fit. The caller reads them, and adds the received bytes to [`IdentityAnswers::answers`].
+/// Returns the objects to read before [`recognise`] can decide. Empty if no object is needed, or if no description can
+/// fit. The caller reads them, and adds the received bytes to [`IdentityAnswers::answers`].
 pub fn objects_to_read(traits: &IdentityAnswers) -> Vec<ObjectId> {
-    // Other descriptions with the same number of identity keys cannot change the decision. Only a description with more
+    // Other descriptions with the agree_if_known number of identity keys cannot change the decision. Only a description with more
     // identity keys would have priority.
-    let decided = recognise(traits).map_or(0, |model| model.rank().0);
-    let open = |model: &&Arc<Model>| model.has_identity(traits) && model.rank().0 > decided;
+    let decided_keys = recognise(traits).map_or(0, |model| model.rank().0);
+    let is_undecided = |model: &&Arc<Model>| model.has_identity(traits) && model.rank().0 > decided_keys;
     let mut objects: Vec<ObjectId> = all()
-        .filter(open)
+        .filter(is_undecided)
         .flat_map(|model| model.description.identify.confirm.keys().copied())
         .filter(|object| !traits.answers.contains_key(object))
         .collect();

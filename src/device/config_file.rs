@@ -1,4 +1,4 @@
-//! A file with the settings of a device (`config dump`, `config apply`): TOML, flattened into keys with their places.
+//! Reads the settings file of a device (`config dump`, `config apply`): TOML, flattened into keys with their places.
 //!
 //! The keys are paths: `event-timer` below `[tpdo.1]` is `tpdo.1.event-timer`. This module does not know the meaning of
 //! the keys.
@@ -17,7 +17,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// The place of a byte of a text.
+    /// Converts a byte offset of a text to line and column.
     pub fn of(text: &str, offset: usize) -> Place {
         let before = text.get(..offset).unwrap_or(text);
         let line = before.matches('\n').count() + 1;
@@ -92,7 +92,7 @@ pub struct Entry {
     pub value_at: Place,
 }
 
-/// The contents of a file, in the order of the places.
+/// The contents of a file, sorted by the place in the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Document {
     /// The keys with their values.

@@ -67,7 +67,7 @@ impl Dictionary {
         self.aliases.insert(name, object);
     }
 
-    /// Adds a name as the file spells it. Several objects can have it; letter case and width of blanks are ignored.
+    /// Adds a name as spelled in the file. Several objects can have it; letter case and number of blanks are ignored.
     pub fn insert_spelling(&mut self, name: &str, object: ObjectId) {
         let name = folded(name);
         if !name.is_empty() {
@@ -95,7 +95,7 @@ impl Dictionary {
         self.entries.values()
     }
 
-    /// Every name, in lower case, with its object. Names come after those over which they have priority.
+    /// Returns every name in lower case, with its object. Names with a higher priority come later.
     pub fn names(&self) -> impl Iterator<Item = (String, ObjectId)> + '_ {
         let unique = |(name, objects): (&String, &BTreeSet<ObjectId>)| {
             objects.first().filter(|_| objects.len() == 1).map(|object| (name.clone(), *object))
@@ -154,12 +154,12 @@ impl Dictionary {
     }
 }
 
-/// The form in which spellings are compared.
+/// Returns the form of a name that is compared: in lower case, with single blanks.
 fn folded(name: &str) -> String {
     name.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase()
 }
 
-/// The possible names for a name as in an EDS (`Position Value:1`): with sub-index, and as a whole.
+/// Returns the hyphenated forms of a name in an EDS: `Position Value:1` is `position-value:1` or `position-value-1`.
 pub fn spellings(name: &str) -> Vec<String> {
     let with_sub = name.rsplit_once(':').filter(|(_, sub)| sub.parse::<u8>().is_ok());
     let with_sub = with_sub.map(|(name, sub)| format!("{}:{sub}", slug(name)));

@@ -105,7 +105,7 @@ pub fn measured(profile: u32) -> &'static [Measured] {
     }
 }
 
-/// The other named objects of a profile.
+/// The named objects of a profile that are not measured values.
 fn settings(profile: u32) -> &'static [Measured] {
     const ENCODER_SETTINGS: &[Measured] = &[
         one(0x6000, "operating-parameters"),
@@ -138,7 +138,7 @@ fn settings(profile: u32) -> &'static [Measured] {
     }
 }
 
-/// The named settings of a profile; of an array only the first two entries.
+/// The settings of a profile. Only the first two entries of an array are included.
 pub fn settings_of(profile: u32) -> impl Iterator<Item = ObjectId> {
     let subs = |row: &Measured| if row.is_array { 1..=2 } else { 0..=0 };
     settings(profile).iter().flat_map(move |row| subs(row).map(|sub| ObjectId::new(row.index, sub)))
@@ -169,7 +169,7 @@ pub fn find(profile: u32, text: &str) -> Option<ObjectId> {
     name(profile, object).filter(|name| *name == text).map(|_| object)
 }
 
-/// The step of an integer: its object, its unit, and its decimal digits in this unit.
+/// The step (resolution) of an integer: the object that contains it, its unit and its decimal digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
     /// The object with the step.
@@ -180,16 +180,16 @@ pub struct Step {
     pub digits: u8,
 }
 
-/// The step of a measured value. `device_type` is 1000h with all 32 bits. `None` if the number is the value.
+/// Returns the step of a measured value. `device_type` is 1000h with all 32 bits. `None` if the number needs no step.
 pub fn step(device_type: u32, object: ObjectId) -> Option<Step> {
     // CiA 406: absolute linear encoders, also with cyclic coding.
     let is_linear = matches!(device_type >> 16, 8 | 9);
     match (device_type & 0xffff, object.index) {
-        // CiA 410: in steps of 0.001 deg.
+        // CiA 410: the step is in 0.001 deg.
         (INCLINOMETER, 0x6010 | 0x6020 | 0x6110 | 0x6120) => {
             Some(Step { object: ObjectId::new(0x6000, 0), unit: "deg", digits: 3 })
         }
-        // CiA 406: in nm, and in 0.01 mm/s.
+        // CiA 406: the steps are in nm and in 0.01 mm/s.
         (ENCODER, 0x6004 | 0x6020) if is_linear => {
             Some(Step { object: ObjectId::new(0x6005, 1), unit: "mm", digits: 6 })
         }
@@ -198,11 +198,12 @@ pub fn step(device_type: u32, object: ObjectId) -> Option<Step> {
     }
 }
 
-/// The first and the last index of objects with one type.
+/// First index, last index and type of objects in a row.
 type Row = (u16, u16, DataType);
 
 const GENERIC_IO_OBJECTS: &[Row] = &[
-    // Inputs: 8, 1, 16 and 32 digital lines an object; analogue inputs. The type of 6404h is the manufacturer's.
+    // Inputs: objects with 8, 1, 16 and 32 digital lines, then analogue inputs. The type of 6404h is
+    // manufacturer-specific.
     (0x6000, 0x6000, U8),
     (0x6020, 0x6027, BOOL),
     (0x6100, 0x6100, U16),
@@ -257,8 +258,8 @@ const INCLINOMETER_OBJECTS: &[Row] = &[
     (0x6122, 0x6124, I32),
 ];
 
-/// CiA 404: the analogue inputs of one family. The first digit of the index is the family and gives the type: 6 REAL32,
-/// 7 INTEGER16, 8 INTEGER24, 9 INTEGER32. The table has the index without its first digit.
+/// CiA 404: the analogue inputs of one family. The first digit of the index is the family: 6 is REAL32, 7 INTEGER16, 8
+/// INTEGER24, 9 INTEGER32. The table contains the other three digits.
 const FAMILY_OBJECTS: &[(u16, Meaning)] = &[
     (0x100, Meaning::Field),
     (0x120, Meaning::Field),

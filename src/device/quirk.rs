@@ -1,4 +1,4 @@
-//! Deviations of real devices that data cannot express, each with a name.
+//! Deviations of real devices that need their own code, each with a name.
 
 /// A deviation from the standard. Each one is handled in one place in the code, which mentions its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

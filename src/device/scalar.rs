@@ -72,8 +72,8 @@ fn encode_integer(number: i64, data_type: DataType) -> Result<Vec<u8>, ValueErro
     data_type.encode_text(&number.to_string())
 }
 
-/// The number that is added to the node-ID in
-/// `$NODEID+0x180`. The terms may have either order: CiA 306 requires `$NODEID` first, but real files deviate.
+/// Returns the number that is added to the node-ID in `$NODEID+0x180`. The terms may have either order: CiA 306
+/// requires `$NODEID` first, but real files deviate.
 fn node_formula(text: &str) -> Option<u32> {
     let folded = text.to_ascii_uppercase().replace(' ', "");
     if folded == "$NODEID" {

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-/// A decimal number as a description states it: exact, so that integers stay exact.
+/// A decimal number of a description. It is stored exactly, so that scaled integers stay exact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decimal {
     /// The number without its decimal point.
@@ -16,7 +16,7 @@ impl Decimal {
     pub const ONE: Decimal = Decimal { mantissa: 1, digits: 0 };
     /// The number 0.
     pub const ZERO: Decimal = Decimal { mantissa: 0, digits: 0 };
-    /// No type represents more digits exactly.
+    /// A REAL64 represents at most this number of digits exactly.
     const MAX_DIGITS: usize = 15;
 
     /// `mantissa` divided by ten to the power of `digits`, without zeros at the end.
@@ -58,7 +58,7 @@ impl FromStr for Decimal {
     }
 }
 
-/// From the number in an object to the value: times `factor`, plus `offset`.
+/// Converts the number in an object to the value: number * `factor` + `offset`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scale {
     /// Not 0.
@@ -67,7 +67,7 @@ pub struct Scale {
     pub offset: Decimal,
 }
 
-/// One item for each kind of bad value.
+/// One item for each reason why a value is bad.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bad<T> {
     /// For a value that is not valid.
@@ -85,14 +85,14 @@ impl StatusBits {
     /// 6150h of CiA 404.
     pub const CIA_404: StatusBits = Bad { invalid: 1, high: 2, low: 4 };
 
-    /// The same status as bits of 6150h.
+    /// Converts bits of this status object to the bits of 6150h.
     pub fn to_cia_404(&self, bits: u64) -> u64 {
         let bit = |mask: u64, bit: u64| if bits & mask == 0 { 0 } else { bit };
         bit(self.invalid, 1) | bit(self.high, 2) | bit(self.low, 4)
     }
 }
 
-/// Numbers that replace a value.
+/// Numbers that a device sends instead of a value.
 pub type Markers = Bad<Vec<i64>>;
 
 impl Default for Markers {
@@ -102,12 +102,12 @@ impl Default for Markers {
 }
 
 impl Markers {
-    /// Whether there is any.
+    /// Whether no number is a marker.
     pub fn is_empty(&self) -> bool {
         self.invalid.is_empty() && self.high.is_empty() && self.low.is_empty()
     }
 
-    /// The status that a number marks, as bits of 6150h; the value is not valid.
+    /// Returns the status of a marker as bits of 6150h, or `None` if the number is not a marker.
     pub fn status_bits(&self, number: i64) -> Option<u64> {
         let lists = [(&self.high, 0b011), (&self.low, 0b101), (&self.invalid, 0b001)];
         lists.into_iter().find(|(list, _)| list.contains(&number)).map(|(_, bits)| bits)

@@ -10,8 +10,8 @@ impl Model {
     pub fn search(&self, query: &str) -> Vec<&Entry> {
         let query = query.trim();
         if let Ok(object) = query.parse::<ObjectId>() {
-            let is_whole = !query.contains([':', '.']);
-            let fits = |entry: &&Entry| entry.object == object || is_whole && entry.object.index == object.index;
+            let has_no_sub = !query.contains([':', '.']);
+            let fits = |entry: &&Entry| entry.object == object || has_no_sub && entry.object.index == object.index;
             let found: Vec<&Entry> = self.dictionary.iter().filter(fits).collect();
             if !found.is_empty() {
                 return found;

@@ -1,6 +1,6 @@
 //! Sensor types as coded in 6110h (CiA 404-1).
 
-/// Codes and their meanings: 2 (HBM MC1609), 90 and 100 (WIKA MH-4-CAN, HYDAC) from manuals. The others are general
+/// Codes and their meanings: 2 (HBM MC1609), 90 and 100 (WIKA MH-4-CAN, HYDAC) are from manuals. The others are general
 /// knowledge of CiA 404, without a page reference.
 const KINDS: [(u16, &str); 16] = [
     (1, "thermocouple J"),
@@ -26,7 +26,7 @@ pub fn code(word: &str) -> Option<u16> {
     KINDS.iter().find(|(_, kind)| is_same(kind, word)).map(|(code, _)| *code)
 }
 
-/// Whether two words mean the same kind of sensor. Case, blanks and the words "thermocouple" and "type" do not count.
+/// Whether two words mean the same kind of sensor. Case, blanks and the words "thermocouple" and "type" are ignored.
 pub fn is_same(one: &str, other: &str) -> bool {
     let bare = |text: &str| {
         let folded = text.to_lowercase();

@@ -121,7 +121,7 @@ pub fn entry(object: ObjectId) -> Option<Entry> {
     rows.iter().find_map(|row| row.entry(object, &prefix))
 }
 
-/// The fixed unit of the number in an object of CiA 301, in the form of descriptions: `ms`, `100us`.
+/// The fixed unit of the number in an object of CiA 301, as written in descriptions: `ms`, `100us`.
 pub fn unit(object: ObjectId) -> Option<&'static str> {
     match (object.index, object.sub) {
         (0x1006 | 0x1007, 0) => Some("us"),
@@ -152,7 +152,7 @@ pub fn find(name: &str) -> Option<Entry> {
     ROWS.iter().filter(|row| row.name == bare).find_map(|row| found(row, row.index))
 }
 
-/// The objects of 1000h to 1FFFh that are not part of a run. PDOs are missing.
+/// The objects of 1000h to 1FFFh that are not part of a run, without the PDO parameters.
 pub fn single_objects() -> impl Iterator<Item = ObjectId> {
     let single = ROWS.iter().filter(|row| row.first == row.last && row.index < 0x2000);
     single.map(|row| ObjectId::new(row.index, row.first))

@@ -40,7 +40,7 @@ const fn scaled(code: u8, symbol: &'static str, quantity: Quantity, factor: f64,
 const PSI_PA: f64 = 0.453_592_37 * 9.806_65 / (0.0254 * 0.0254);
 
 /// Sources: DRP-303-2 V1.1, except 2Dh (MH-4, MC1609), 4Eh, ABh, ACh (MH-4, DPS), 26h (esd CAN-CBX-THERMO) and 41h
-/// (Epson). 40h-4Ch without 41h and 25h-32h without 26h: general knowledge of CiA 303-2, without a page reference.
+/// (Epson). The other codes in 25h-32h and 40h-4Ch: general knowledge of CiA 303-2, without a page reference.
 ///
 /// To add a unit, add one line.
 const BASES: &[Base] = &[
@@ -108,7 +108,7 @@ const PREFIXES: &[(i8, &str)] = &[
     (-18, "a"),
 ];
 
-/// Units of descriptions that CiA 303-2 has no code for. Their codes have a denominator that no device can send.
+/// Units in descriptions without a code in CiA 303-2. Their codes here have a denominator that no device can send.
 const EXTRA: [&str; 13] =
     ["%", "rpm", "1/min", "1/s", "ppm", "dB", "pH", "step", "kWh", "%RH", "m3/h", "l/min", "m/s2"];
 
@@ -120,7 +120,7 @@ const FARAD: Unit = Unit(0x0027_0000);
 const DEGREE_CELSIUS: Unit = Unit(0x002d_0000);
 const DEGREE_FAHRENHEIT: Unit = Unit(0x00ac_0000);
 
-/// A symbol without the degree sign and the micro signs.
+/// Replaces the degree sign and the micro signs by ASCII letters.
 fn ascii(text: &str) -> String {
     text.replace('\u{b0}', "deg").replace(['\u{b5}', '\u{3bc}'], "u")
 }
@@ -193,7 +193,8 @@ impl Unit {
         found
     }
 
-    /// The unit that a user means for a value in the unit `other`: for a temperature, `C` and `F` are degrees.
+    /// Returns the unit that the user means together with the unit `other`: with a temperature, `C` and `F` are
+    /// degrees.
     #[must_use]
     pub fn beside(self, other: Unit) -> Unit {
         match self {
@@ -242,8 +243,7 @@ impl Unit {
         self.convert_with_zeros(value, to, 1.0)
     }
 
-    /// Converts a value that contains the zero point of its scale `zeros` times: once for a temperature, 0 times for a
-    /// difference.
+    /// Converts a value that contains the offset of its scale `zeros` times: 1 for a temperature, 0 for a difference.
     pub fn convert_with_zeros(self, value: f64, to: Unit, zeros: f64) -> Option<f64> {
         if self == to {
             return Some(value);

@@ -78,7 +78,7 @@ struct TpdoDecoder {
     values: Vec<MappedValue>,
     /// Whether TPDOs are ignored at present.
     is_paused: bool,
-    /// TPDOs received with another length.
+    /// The number of TPDOs received with another length.
     wrong_lengths: u64,
     /// The length of the first TPDO with another length.
     other_length: Option<usize>,
@@ -113,13 +113,13 @@ impl TpdoDecoder {
 pub struct Decoder {
     tpdos: CanIdMap<TpdoDecoder>,
     sources: Vec<Source>,
-    /// COB-IDs of two TPDOs that were not reported yet.
+    /// COB-IDs that two TPDOs share, not reported yet.
     shared: BTreeMap<CanId, [(NodeId, TpdoNumber); 2]>,
-    /// Overloads that nodes report by emergencies, each with its channel if it has one.
+    /// Overloads that nodes report by emergencies, each with its channel if the emergency contains one.
     overloads: BTreeSet<(NodeId, Option<u8>)>,
 }
 
-/// Lengths of TPDOs that differ from their mapping: the first such length, and whether there were others.
+/// TPDO lengths that differ from the mapping: the first such length, and whether there were other lengths.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LengthsSeen(BTreeMap<CanId, (usize, bool)>);
 
@@ -146,7 +146,7 @@ impl Decoder {
         self.sources.len() - 1
     }
 
-    /// Decodes every valid TPDO of a node; with `wanted`, only these values.
+    /// Adds the valid TPDOs of a node. If `wanted` is not empty, only these values are decoded.
     pub fn add(&mut self, layout: Layout<'_>, wanted: &[Wanted]) {
         for tpdo in layout.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()) {
             let mut decoder = self.tpdo_decoder(layout, tpdo, wanted);
@@ -167,7 +167,7 @@ impl Decoder {
         }
     }
 
-    /// Decodes a node that was read again. Its old TPDOs are removed.
+    /// Replaces the TPDOs of a node that was read again.
     pub fn replace(&mut self, layout: Layout<'_>, wanted: &[Wanted]) {
         self.remove(layout.node);
         self.add(layout, wanted);
@@ -209,7 +209,7 @@ impl Decoder {
         self.tpdos.retain(|_, tpdo| tpdo.node != node);
     }
 
-    /// A node reports an overload of a channel; `None` if the emergency contains no channel.
+    /// Records that a node reports an overload of a channel; `None` if the emergency contains no channel.
     pub fn begin_overload(&mut self, node: NodeId, channel: Option<u8>) {
         self.overloads.insert((node, channel));
     }
@@ -222,7 +222,7 @@ impl Decoder {
         }
     }
 
-    /// A node reports that its overloads have ended.
+    /// Removes the overloads of a node, because the node reports that they have ended.
     pub fn end_overload(&mut self, node: NodeId) {
         self.overloads.retain(|(of, _)| *of != node);
     }
@@ -233,7 +233,7 @@ impl Decoder {
         of_node.for_each(|(_, channel)| reading.report_overload(sample, *channel));
     }
 
-    /// The setup of a node may have changed: its TPDOs are ignored until [`Decoder::replace`].
+    /// Ignores the TPDOs of a node until [`Decoder::replace`], because its configuration may have changed.
     pub fn pause(&mut self, node: NodeId) {
         self.tpdos.values_mut().filter(|tpdo| tpdo.node == node).for_each(|tpdo| tpdo.is_paused = true);
     }
@@ -291,7 +291,7 @@ impl Decoder {
         &self.sources
     }
 
-    /// COB-IDs of two TPDOs, of one node or of two nodes, each returned once. These TPDOs are ignored.
+    /// Returns the new COB-IDs that two TPDOs share, of one node or of two nodes. The decoder ignores both TPDOs.
     pub fn take_shared_cob_ids(&mut self) -> BTreeMap<CanId, [(NodeId, TpdoNumber); 2]> {
         std::mem::take(&mut self.shared)
     }
@@ -302,13 +302,13 @@ impl Decoder {
         Some([tpdo.shared_with?, (tpdo.node, tpdo.number)])
     }
 
-    /// All COB-IDs of two TPDOs of one node.
+    /// All COB-IDs that two TPDOs of the same node share.
     pub fn shared_cob_ids(&self) -> impl Iterator<Item = (CanId, [(NodeId, TpdoNumber); 2])> + '_ {
         let shared = self.tpdos.keys().filter_map(|&id| Some((id, self.shared_cob_id(id)?)));
         shared.filter(|(_, [(one, _), (other, _)])| one == other)
     }
 
-    /// The length in bytes of the mapping of the TPDO with this COB-ID, and its node.
+    /// The node and the mapped length in bytes of the TPDO with this COB-ID.
     pub fn mapped_length(&self, id: CanId) -> Option<(NodeId, usize)> {
         self.tpdos.get(&id).map(|tpdo| (tpdo.node, tpdo.length))
     }
@@ -347,7 +347,7 @@ impl Decoder {
             return Decoded::OtherFrame;
         };
         if tpdo.length == 0 {
-            // Its mapping could not be read, or it is a multiplexed PDO.
+            // The mapping could not be read, or it is a multiplexed PDO.
             return Decoded::OtherFrame;
         }
         if tpdo.is_paused {

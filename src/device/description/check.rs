@@ -6,7 +6,7 @@ use crate::canopen::value::DataType;
 use crate::device::assign::AssignKind;
 use std::collections::BTreeSet;
 
-/// The tables of the file, for the lines of mistakes. Each list has the order of the list in [`Description`].
+/// The tables of the file, which give the lines for messages. Each list has the same order as in [`Description`].
 pub(super) struct Tables<'a, 't> {
     pub(super) file: &'a Table<'t>,
     pub(super) identify: Option<&'a Table<'t>>,
@@ -22,7 +22,7 @@ pub(super) struct Tables<'a, 't> {
 /// Highest CiA 404 channel: 6130h has sub-indices 1 to 199.
 const LAST_CHANNEL: u8 = 199;
 
-/// The number of the first signal without a channel.
+/// The first channel number for signals without a CiA 404 channel.
 pub(super) const FIRST_WITHOUT_CHANNEL: u8 = 200;
 
 /// Placeholder for a missing channel, until the signals are numbered.
@@ -30,7 +30,7 @@ pub(super) const NO_CHANNEL: u8 = u8::MAX;
 
 /// Reports every contradiction.
 pub(super) fn check(description: &Description, tables: &Tables<'_, '_>) {
-    let known = Known::of(description);
+    let known = KnownObjects::of(description);
     characters(tables.file, &description.name);
     objects(description, &known, tables);
     signals(description, &known, tables);
@@ -49,13 +49,13 @@ pub(super) fn check(description: &Description, tables: &Tables<'_, '_>) {
 }
 
 /// The objects of the description.
-struct Known<'a> {
+struct KnownObjects<'a> {
     description: &'a Description,
 }
 
-impl Known<'_> {
-    fn of(description: &Description) -> Known<'_> {
-        Known { description }
+impl KnownObjects<'_> {
+    fn of(description: &Description) -> KnownObjects<'_> {
+        KnownObjects { description }
     }
 
     /// Reports an object that is used but not described. A description without objects is not checked.
@@ -66,7 +66,7 @@ impl Known<'_> {
     }
 }
 
-/// Reports a name with characters other than lower case, digits and hyphens.
+/// Reports a name with characters other than a to z, 0 to 9 and hyphens. Returns whether all are allowed.
 fn characters(table: &Table<'_>, name: &str) -> bool {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     let is_plain = !name.is_empty() && name.chars().all(plain);
@@ -78,14 +78,14 @@ fn characters(table: &Table<'_>, name: &str) -> bool {
     is_plain
 }
 
-/// Reports the name of a signal or an object that could be an address.
+/// Reports a name of a signal or object that can be confused with an address.
 fn name(table: &Table<'_>, name: &str) {
     if characters(table, name) && ObjectId::reads_as_address(name) {
         table.mistake("name", format!("name: \"{name}\" would be read as an address"));
     }
 }
 
-fn objects(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+fn objects(description: &Description, known: &KnownObjects<'_>, tables: &Tables<'_, '_>) {
     let mut names = BTreeMap::new();
     let mut addresses = BTreeSet::new();
     for (entry, table) in description.objects.iter().zip(&tables.objects) {
@@ -114,18 +114,19 @@ fn objects(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
     }
 }
 
-/// Checks that every mapping belongs to a TPDO with parameters, and that its default contains described objects with
-/// their width.
+/// Checks that each mapping has a TPDO with communication parameters, and that each mapped object is described with the
+/// mapped width.
 fn pdos(description: &Description, tables: &Tables<'_, '_>) {
     let has = |index: u16| description.objects.iter().any(|object| object.at.first.index == index);
-    let numbers: BTreeSet<u16> = description.objects.iter().filter_map(|object| tpdo(object.at.first.index)).collect();
+    let numbers: BTreeSet<u16> =
+        description.objects.iter().filter_map(|object| tpdo_number(object.at.first.index)).collect();
     if let Some(signal) = tables.signals.first().filter(|_| numbers.is_empty()) {
         signal.note("name", "no TPDO is described (objects 18xxh and 1Axxh): they are read from the device");
     }
     let mut reported = BTreeSet::new();
     for (entry, table) in description.objects.iter().zip(&tables.objects) {
         let index = entry.at.first.index;
-        let Some(number) = tpdo(index) else { continue };
+        let Some(number) = tpdo_number(index) else { continue };
         let missing = Some(0x1800 + number).filter(|missing| !has(*missing));
         if let Some(missing) = missing.filter(|missing| reported.insert(*missing)) {
             table.mistake("at", format!("at: there is no [[object]] 0x{missing:04X} of the same TPDO"));
@@ -135,18 +136,18 @@ fn pdos(description: &Description, tables: &Tables<'_, '_>) {
             && entry.at.first.sub > 0
             && word != 0
         {
-            mapped(description, table, word);
+            check_mapping_entry(description, table, word);
         }
     }
 }
 
 /// The number of the TPDO to which an index belongs, counted from 0.
-fn tpdo(index: u16) -> Option<u16> {
+fn tpdo_number(index: u16) -> Option<u16> {
     (0x1800..0x1c00).contains(&index).then_some(index & 0x1ff)
 }
 
-/// Checks the entry of a default mapping.
-fn mapped(description: &Description, table: &Table<'_>, word: i64) {
+/// Checks an entry of a default mapping.
+fn check_mapping_entry(description: &Description, table: &Table<'_>, word: i64) {
     let [bits, sub, low, high, ..] = word.to_le_bytes();
     let object = ObjectId::new(u16::from_le_bytes([low, high]), sub);
     let Some(entry) = description.object(object) else {
@@ -193,7 +194,7 @@ fn values(entry: &ObjectEntry, table: &Table<'_>) {
     }
 }
 
-fn signals(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+fn signals(description: &Description, known: &KnownObjects<'_>, tables: &Tables<'_, '_>) {
     let (mut names, mut channels) = (BTreeSet::new(), BTreeSet::new());
     for (signal, table) in description.signals.iter().zip(&tables.signals) {
         name(table, &signal.name);
@@ -285,7 +286,7 @@ fn emergencies(description: &Description, tables: &Tables<'_, '_>) {
     }
 }
 
-fn identify(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+fn identify(description: &Description, known: &KnownObjects<'_>, tables: &Tables<'_, '_>) {
     let Some(table) = tables.identify.filter(|_| !description.identify.is_empty()) else {
         let text = "no [identify]: the device is not recognised, the description is used only with --device";
         return tables.file.note("name", text);
@@ -337,7 +338,7 @@ fn bit_rates(description: &Description, tables: &Tables<'_, '_>) {
     }
 }
 
-fn assign(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+fn assign(description: &Description, known: &KnownObjects<'_>, tables: &Tables<'_, '_>) {
     for (entry, table) in description.assign.iter().zip(&tables.assign) {
         let places = [("node_id", entry.node_id), ("bit_rate", entry.bit_rate)];
         let places = places.into_iter().filter_map(|(key, place)| Some((key, place?)));
@@ -345,7 +346,7 @@ fn assign(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>)
         if has_place == (entry.kind == AssignKind::Lss) {
             table.mistake("way", "way: \"objects\" needs node_id or bit_rate, and \"lss\" has neither");
         }
-        // Objects that only other documents mention are marked as unverified and may be missing.
+        // An unverified method may use objects that the description does not contain.
         for (key, place) in places.filter(|_| !entry.unverified) {
             known.require(table, key, place.object);
             if let Some(object) = description.object(place.object).filter(|it| it.data_type != place.data_type) {
@@ -358,7 +359,7 @@ fn assign(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>)
     }
 }
 
-fn autozero(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+fn autozero(description: &Description, known: &KnownObjects<'_>, tables: &Tables<'_, '_>) {
     for (entry, table) in description.autozero.iter().zip(&tables.autozero) {
         known.require(table, "object", entry.object);
         if let Some(object) = entry.offset {

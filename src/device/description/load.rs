@@ -43,7 +43,8 @@ fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
     let auto_bit_rate = file.optional("auto_bit_rate");
     let mut identify = file.table("identify");
     let mut bit_rates = file.table("bit_rates");
-    let (factory, sdo, pdo) = (part(file, "factory", factory), part(file, "sdo", sdo), part(file, "pdo", pdo));
+    let (factory, sdo, pdo) =
+        (optional_table(file, "factory", factory), optional_table(file, "sdo", sdo), optional_table(file, "pdo", pdo));
     let mut startup = file.table("startup");
     let (assign, assign_tables) = entries(file, "assign", assign_entry);
     let (autozero, autozero_tables) = entries(file, "autozero", autozero_entry);
@@ -94,11 +95,11 @@ fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
     Some(description)
 }
 
-fn part<'t, T: Default>(file: &mut Table<'t>, key: &'static str, read: fn(&mut Table<'t>) -> T) -> T {
+fn optional_table<'t, T: Default>(file: &mut Table<'t>, key: &'static str, read: fn(&mut Table<'t>) -> T) -> T {
     file.table(key).map(|mut table| read(&mut table)).unwrap_or_default()
 }
 
-/// The entries of an array of tables, and the table of each. Entries with mistakes are missing in both.
+/// Reads an array of tables. Returns the entries and their tables; both lists omit entries with mistakes.
 fn entries<'t, T>(
     file: &mut Table<'t>,
     key: &'static str,
@@ -251,7 +252,7 @@ fn signal(table: &mut Table<'_>) -> Option<SignalEntry> {
     })
 }
 
-/// Numbers the signals without a channel.
+/// Gives the signals without a channel the numbers from 200 on.
 fn number_signals(signals: &mut [SignalEntry]) {
     for (signal, number) in
         signals.iter_mut().filter(|signal| signal.channel == NO_CHANNEL).zip(FIRST_WITHOUT_CHANNEL..)

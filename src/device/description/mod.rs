@@ -1,7 +1,7 @@
 //! Device descriptions: the contents of one TOML file in `devices/`, as checked types.
 //!
-//! `load.rs` reads a file once: addresses, ranges and values are parsed, and every mistake has its line. Later code
-//! parses nothing.
+//! `load.rs` parses addresses, ranges and values once, and reports each mistake with its line. Other code does not
+//! parse.
 
 mod check;
 mod load;
@@ -51,7 +51,7 @@ pub struct Description {
     pub title: String,
     /// The manufacturer: `WIKA`.
     pub vendor: String,
-    /// The documents that the facts come from.
+    /// The documents on which the description is based.
     pub source: String,
     /// Whether no manual confirms the description. The description then allows only reading. To store, or to set a
     /// zero, a node-ID or a bit rate, the user must name the description.
@@ -60,13 +60,13 @@ pub struct Description {
     pub identify: Identify,
     /// Node-ID and bit rate of a new device.
     pub factory: Factory,
-    /// How its SDO server behaves.
+    /// How the SDO server of the device behaves.
     pub sdo: SdoStyle,
-    /// How its PDOs are configured.
+    /// How the PDOs of the device are configured.
     pub pdo: PdoStyle,
-    /// Deviations from the standard that data cannot express.
+    /// Deviations from the standard that need their own code.
     pub quirks: Vec<Quirk>,
-    /// The layout of an entry of its error history (1003h).
+    /// The layout of the entries of the error history (1003h).
     pub error_history: ErrorHistory,
     /// Objects that count errors, shown with the error history.
     pub error_counters: Vec<ObjectId>,
@@ -87,9 +87,9 @@ pub struct Description {
     pub signals: Vec<SignalEntry>,
     /// The object dictionary.
     pub objects: Vec<ObjectEntry>,
-    /// The meanings of its emergency codes.
+    /// The meanings of the emergency codes of the device.
     pub emergencies: Vec<EmergencyEntry>,
-    /// The deviations from the standard that its manual states.
+    /// The deviations from the standard that the manual states.
     pub deviations: Vec<Deviation>,
 }
 
@@ -98,7 +98,7 @@ pub struct Description {
 pub struct Deviation {
     /// The case of `conform` that finds it: `SDO-07`.
     pub case: String,
-    /// The indices that it concerns; empty for all.
+    /// The objects with this deviation; empty for all objects.
     pub objects: Vec<ObjectId>,
     /// What the manual states.
     pub text: String,
@@ -111,9 +111,9 @@ pub struct Deviation {
 pub struct Startup {
     /// An object of type UNSIGNED32.
     pub object: ObjectId,
-    /// Its value if the device waits for the master.
+    /// The value of the object if the device waits for the master.
     pub wait: u32,
-    /// Its value if the device starts by itself.
+    /// The value of the object if the device starts by itself.
     pub auto: u32,
     /// Contradictions and gaps in the manual.
     pub doubt: String,
@@ -125,14 +125,14 @@ pub enum ErrorHistory {
     /// CiA 301, 7.5.2.5: the code in bits 0 to 15; the upper half is manufacturer-specific.
     #[default]
     CodeLow,
-    /// The code in bits 0 to 15, byte 4 of the emergency in 16 to 23 and byte 3 in 24 to 31 (MH-4).
+    /// The code in bits 0 to 15, byte 4 of the emergency in bits 16 to 23, byte 3 in bits 24 to 31 (MH-4).
     CodeLowBytesSwapped,
     /// The code in bits 16 to 31 (HYDAC).
     CodeHigh,
 }
 
 impl ErrorHistory {
-    /// The emergency code of an entry, and bytes 3 and 4 of the emergency if the entry contains them.
+    /// Returns the emergency code of an entry, and bytes 3 and 4 of the emergency if the entry contains them.
     pub fn read(self, entry: u32) -> (u16, Option<[u8; 2]>) {
         let [a, b, c, d] = entry.to_le_bytes();
         match self {
@@ -154,7 +154,7 @@ pub struct Autozero {
     pub signature: Vec<u8>,
     /// The object that contains the resulting offset, in the unit of the process value.
     pub offset: Option<ObjectId>,
-    /// How to recognise a sensor that measures absolute pressure: its zero is a vacuum, not a vented line.
+    /// How to recognise a sensor for absolute pressure, which reads 0 in a vacuum and not with a vented line.
     pub absolute: Option<Absolute>,
     /// The measuring range of the sensor, if it differs from the adjustable span.
     pub range: Option<Range>,
@@ -172,16 +172,16 @@ pub struct Absolute {
 /// The objects that contain a measuring range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Range {
-    /// The object with its start.
+    /// The object with the start of the range.
     pub start: ObjectId,
-    /// The object with its end.
+    /// The object with the end of the range.
     pub end: ObjectId,
-    /// The object with the unit of both.
+    /// The object with the unit of start and end.
     pub unit: ObjectId,
 }
 
-/// The answers that identify a kind of device; all given ones must agree. A description without any is used only if the
-/// user names it.
+/// The answers that identify a device. Each value that is given must agree. A description without values is used only
+/// if the user names it.
 #[derive(Clone, Debug, Default)]
 pub struct Identify {
     /// 1000h, all 32 bits.
@@ -197,7 +197,7 @@ pub struct Identify {
 }
 
 impl Identify {
-    /// Whether no answer is given. Then the description recognises no device.
+    /// Whether no value is given. The description then recognises no device.
     pub fn is_empty(&self) -> bool {
         self.identity_count() == 0 && self.confirm.is_empty()
     }
@@ -290,14 +290,14 @@ pub struct SignalEntry {
     pub digits: Option<ObjectId>,
     /// The object with the status (6150h), if the device has one.
     pub status: Option<ObjectId>,
-    /// The bits of the status object, if they are not those of 6150h.
+    /// The meanings of the bits of the status object, if they differ from 6150h.
     pub status_bits: Option<StatusBits>,
-    /// Whether an overload replaces the value itself (REAL32 NaN, smallest integer).
+    /// Whether the device sends a marker instead of the value during an overload (REAL32 NaN, smallest integer).
     pub marker: bool,
-    /// Other numbers that replace the value.
+    /// Other numbers that the device sends instead of a value.
     pub markers: Markers,
     /// Whether the manual warns that integers of 8, 16 or 24 bits may be clipped. Their largest number is then not a
-    /// value.
+    /// valid value.
     pub may_clip: bool,
     /// The object with the start of the measuring range (6148h), if the device has it.
     pub span_start: Option<ObjectId>,
@@ -329,7 +329,7 @@ pub struct EmergencyEntry {
     pub text: String,
     /// The bit of 1001h that is set by the error, 0 to 7.
     pub register_bit: Option<u8>,
-    /// The whole register as the manual prints it.
+    /// The whole error register (1001h), as printed in the manual.
     pub register: Option<u8>,
     /// The contents of bytes 3 to 7.
     pub bytes: Vec<String>,
@@ -339,7 +339,7 @@ pub struct EmergencyEntry {
 }
 
 impl EmergencyEntry {
-    /// The register that means this error; 0 means none.
+    /// The value of the error register that identifies this error, if it is not 0.
     fn whole_register(&self) -> Option<u8> {
         self.register.filter(|&register| register != 0)
     }
@@ -368,14 +368,14 @@ impl Description {
         (self.emergencies.iter().filter(|entry| entry.register == Some(register)).count() == 1).then_some(register)
     }
 
-    /// The names of the bits of an error register: those of the device, else those of CiA 301.
+    /// Returns the text for an error register: from the description if possible, otherwise the bit names of CiA 301.
     pub fn register_text(&self, bits: u8) -> String {
         let has_all = |register: u8| register != 0 && bits & register == register;
-        // Every error sets bit 0. If only bit 0 is set, it means the error whose register is 1.
-        let is_meant = |register: u8| has_all(register) && (register != 1 || bits == 1);
+        // Every error sets bit 0. The error whose register is 1 is reported only if no other bit is set.
+        let is_reported = |register: u8| has_all(register) && (register != 1 || bits == 1);
         let (mut texts, mut covered): (Vec<String>, u8) = (Vec::new(), 0);
         let registers: BTreeSet<u8> = self.emergencies.iter().filter_map(EmergencyEntry::whole_register).collect();
-        for register in registers.into_iter().filter(|&register| is_meant(register)) {
+        for register in registers.into_iter().filter(|&register| is_reported(register)) {
             let with = self.emergencies.iter().filter(|entry| entry.whole_register() == Some(register));
             texts.push(with.map(|entry| entry.text.as_str()).collect::<Vec<_>>().join(" or "));
             covered |= register | 1;
@@ -387,16 +387,16 @@ impl Description {
     }
 }
 
-/// The meaning of an emergency on a device with this description: the text of its code, and the set bits of its error
-/// register. The bits are omitted if the device always sends the same register with this code.
+/// Returns the text of an emergency: the meaning of its code, and the set bits of its error register. The bits are
+/// omitted if the device always sends the same register with this code.
 pub fn emergency_text(description: Option<&Description>, emergency: Emergency) -> String {
     let described = description.and_then(|description| description.emergency(emergency.code));
     let text = described.map_or_else(|| Emergency::class(emergency.code), |entry| &entry.text).to_owned();
     if described.is_some_and(|entry| entry.register.is_some()) {
         return text;
     }
-    let words = |register: ErrorRegister| {
+    let register_text = |register: ErrorRegister| {
         description.map_or_else(|| register.to_string(), |description| description.register_text(register.0))
     };
-    emergency.register.map(words).map_or(text.clone(), |words| format!("{text}, {words}"))
+    emergency.register.map(register_text).map_or(text.clone(), |bits| format!("{text}, {bits}"))
 }

@@ -24,7 +24,7 @@ pub struct ObjectEntry {
     pub low: Option<Scalar>,
     /// Highest value allowed; it fits the type.
     pub high: Option<Scalar>,
-    /// Values and ranges allowed, if they are not one range.
+    /// The allowed values and ranges, if `low` and `high` cannot express them.
     pub allow: Vec<NumberRange>,
     /// Meanings of numbers: 004E0000h is bar.
     pub values: BTreeMap<u64, String>,
@@ -39,9 +39,9 @@ pub struct ObjectEntry {
     pub unit: Option<String>,
     /// The channel whose physical unit (6131h) applies to the number, for objects outside of CiA 404.
     pub follows_unit: Option<u8>,
-    /// The object that contains the code of the unit (as 6131h), if it is not the present unit of the channel.
+    /// The object with the code of the unit (as in 6131h), if the number does not use the present unit of the channel.
     pub unit_at: Option<ObjectId>,
-    /// The group of 1010h that stores it; `None` if 1010h does not.
+    /// The group of 1010h that stores the object; `None` if 1010h does not store it.
     pub stored: Option<StoreGroup>,
     /// Its meaning, in one or two sentences.
     pub text: String,
@@ -78,7 +78,7 @@ pub struct ObjectRun {
     pub first: ObjectId,
     /// The last sub-index.
     pub last_sub: u8,
-    /// Whether the description contains a run, even of one object. The objects of a run have numbered names.
+    /// Whether the description states a run, even if it has one object. The objects of a run have numbered names.
     pub is_run: bool,
 }
 
@@ -130,7 +130,7 @@ pub enum Access {
 }
 
 impl Access {
-    /// The word of the description.
+    /// The word in description files.
     pub fn as_str(self) -> &'static str {
         match self {
             Access::Ro => "ro",
@@ -191,7 +191,7 @@ pub enum StoreGroup {
 }
 
 impl StoreGroup {
-    /// The word of the description and of `--group`.
+    /// The word in description files and for `--group`.
     pub fn as_str(self) -> &'static str {
         match self {
             StoreGroup::All => "all",

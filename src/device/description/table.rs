@@ -71,7 +71,7 @@ pub(super) struct Table<'t> {
 }
 
 impl<'t> Table<'t> {
-    /// `offset`: the place of the table in the text.
+    /// Creates the table; `offset` is its byte offset in the text.
     pub(super) fn new(table: &'t DeTable<'t>, offset: usize, source: &'t Source<'t>) -> Table<'t> {
         Table { table, offset, source, known: Vec::new(), missing: Vec::new() }
     }
@@ -130,7 +130,7 @@ impl<'t> Table<'t> {
         self.optional(key).unwrap_or_default()
     }
 
-    /// The values of an array; each wrong one is a mistake.
+    /// Reads the values of an array. Each value that cannot be read is a mistake.
     pub(super) fn list<T: FromToml>(&mut self, key: &'static str) -> Vec<T> {
         match self.value(key).map(|value| (value, value.get_ref())) {
             Some((_, DeValue::Array(array))) => array.iter().filter_map(|value| self.read(key, value)).collect(),
@@ -142,7 +142,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// The entries of a table whose keys are data. `what` names the table in mistakes.
+    /// Reads a table whose keys are data. `what` is the name of the table in messages.
     pub(super) fn entries<K: FromToml + Ord, V: FromToml>(&self, what: &str) -> BTreeMap<K, V> {
         let mut entries = BTreeMap::new();
         for (key, value) in self.table {
@@ -184,8 +184,8 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// Reports every unknown key with the known ones, the most similar first, and every missing key, unless it is the
-    /// misspelt unknown key.
+    /// Reports each unknown key with the known keys, the most similar first. Then reports each missing key, unless an
+    /// unknown key is a misspelling of it.
     pub(super) fn finish(&mut self) {
         for (name, _) in self.table {
             if !self.known.contains(&name.get_ref().as_ref()) {
@@ -214,7 +214,7 @@ fn kind(value: &DeValue<'_>) -> &'static str {
     }
 }
 
-/// A type that one TOML value can be read as. The error states why the value does not fit.
+/// A type that can be read from one TOML value. The error states why the value does not fit.
 pub(super) trait FromToml: Sized {
     fn from_toml(value: &DeValue<'_>) -> Result<Self, String>;
 }
@@ -223,7 +223,7 @@ fn text<'v>(value: &'v DeValue<'_>) -> Result<&'v str, String> {
     value.as_str().ok_or_else(|| format!("{} instead of text in quotes", kind(value)))
 }
 
-/// The text of a value, parsed.
+/// Parses the text of a value.
 pub(super) fn parsed<T: std::str::FromStr>(value: &DeValue<'_>) -> Result<T, String>
 where
     T::Err: Display,
@@ -248,7 +248,7 @@ impl FromToml for bool {
     }
 }
 
-/// Unsigned numbers; a key of a table is text, decimal or hexadecimal.
+/// Reads unsigned integers. Text is accepted because the keys of a table are text: decimal or hexadecimal.
 macro_rules! unsigned {
     ($($name:ident),*) => {
         $(impl FromToml for $name {
@@ -332,7 +332,7 @@ impl UnitEntry {
 impl FromToml for UnitEntry {
     fn from_toml(value: &DeValue<'_>) -> Result<UnitEntry, String> {
         let text = text(value)?;
-        // `0x2131` is an object, `0x004E0000` is too long for one and is a unit code.
+        // `0x2131` is an object. `0x004E0000` is too long for an object, so it is a unit code.
         let object = text.parse().ok().filter(|_| text.starts_with(|first: char| first.is_ascii_digit()));
         let fixed = || Unit::from_symbol(text).map(UnitEntry::Fixed);
         let unknown = || format!("\"{text}\" is neither a known unit (bar, degC, l/h, %) nor an object (0x6131:1)");
@@ -352,8 +352,8 @@ impl FromToml for super::ObjectRun {
     }
 }
 
-/// Reads an enum from its words; any other word is a mistake that lists them.
-macro_rules! words {
+/// Reads an enum from its words. For any other word, the error lists the known ones.
+macro_rules! enum_words {
     ($name:path { $($word:literal => $variant:ident),* $(,)? }) => {
         impl FromToml for $name {
             fn from_toml(value: &DeValue<'_>) -> Result<$name, String> {
@@ -366,20 +366,20 @@ macro_rules! words {
     };
 }
 
-words!(super::Access { "ro" => Ro, "wo" => Wo, "rw" => Rw, "const" => Const });
-words!(super::Signature { "save" => Save, "load" => Load, "zero" => Zero, "tara" => Tare, "set" => Set });
-words!(super::StoreGroup { "all" => All, "comm" => Communication, "app" => Application });
-words!(super::SizeIndication { "indicated" => Indicated, "omitted" => Omitted });
-words!(super::Remap { "invalidate" => Invalidate, "count-only" => CountOnly });
-words!(super::ErrorHistory {
+enum_words!(super::Access { "ro" => Ro, "wo" => Wo, "rw" => Rw, "const" => Const });
+enum_words!(super::Signature { "save" => Save, "load" => Load, "zero" => Zero, "tara" => Tare, "set" => Set });
+enum_words!(super::StoreGroup { "all" => All, "comm" => Communication, "app" => Application });
+enum_words!(super::SizeIndication { "indicated" => Indicated, "omitted" => Omitted });
+enum_words!(super::Remap { "invalidate" => Invalidate, "count-only" => CountOnly });
+enum_words!(super::ErrorHistory {
     "code-low" => CodeLow,
     "code-low-bytes-swapped" => CodeLowBytesSwapped,
     "code-high" => CodeHigh,
 });
-words!(crate::device::assign::AssignKind { "lss" => Lss, "objects" => Objects });
-words!(crate::device::assign::AssignState { "pre-operational" => PreOperational, "stopped" => Stopped });
-words!(crate::device::assign::Applies { "reset" => Reset, "power" => Power });
-words!(crate::device::quirk::Quirk {
+enum_words!(crate::device::assign::AssignKind { "lss" => Lss, "objects" => Objects });
+enum_words!(crate::device::assign::AssignState { "pre-operational" => PreOperational, "stopped" => Stopped });
+enum_words!(crate::device::assign::Applies { "reset" => Reset, "power" => Power });
+enum_words!(crate::device::quirk::Quirk {
     "upload-answered60" => UploadAnswered60,
     "save-all-resets-cob-ids" => SaveAllResetsCobIds,
     "cob-id-zero-is-default" => CobIdZeroIsDefault,

@@ -28,13 +28,13 @@ pub(super) struct Content {
 }
 
 impl Content {
-    /// Sub-index 0 of an array or record without a section; its type comes from CiA 301.
-    pub(super) fn count(of: Option<u8>) -> Content {
+    /// Sub-index 0 of an array or record, if it has no section. The type is that of CiA 301.
+    pub(super) fn count(highest: Option<u8>) -> Content {
         Content {
             data_type: DataType::Unsigned(1),
             is_typed: true,
             access: Access::Ro,
-            default: of.map(|count| Scalar::Integer(i64::from(count))),
+            default: highest.map(|count| Scalar::Integer(i64::from(count))),
             low: None,
             high: None,
             pdo: false,
@@ -118,7 +118,7 @@ impl Reader<'_> {
         [None, None]
     }
 
-    /// Keeps a parameter value that cannot be read, with the reason.
+    /// Records a parameter value that cannot be read, with the reason.
     pub(super) fn unread(&mut self, place: &str, item: &Item, data_type: DataType, is_typed: bool) {
         let reason = match value::scalar(&item.value, data_type) {
             _ if !is_typed => "the data type is unknown".to_owned(),
@@ -144,7 +144,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The data type, and whether the file states a known one. Otherwise the entry has DOMAIN and is read as bytes.
+    /// Returns the data type, and whether it is known. An unknown type becomes DOMAIN, and the value is read as bytes.
     fn data_type(&mut self, section: &Section) -> (DataType, bool) {
         let Some(item) = section.get("datatype") else {
             if number(section, "objecttype") != Some(DOMAIN) {
@@ -215,7 +215,7 @@ impl Reader<'_> {
     }
 }
 
-/// A number that states the kind of an object. Warnings about it are issued elsewhere.
+/// Reads an integer without a warning.
 pub(super) fn number(section: &Section, key: &str) -> Option<i128> {
     value::integer(&section.get(key)?.value).map(|number| number.value)
 }

@@ -53,7 +53,7 @@ fn node_id(section: &Section, warnings: &mut Vec<Warning>) -> Option<NodeId> {
     node
 }
 
-/// The bit rate in bit/s. The unit is kbit/s; some tools write bit/s, which is always above 1000.
+/// Returns the bit rate in bit/s. The file has kbit/s, but some tools write bit/s; these numbers are above 1000.
 fn bit_rate(section: &Section, warnings: &mut Vec<Warning>) -> Option<u32> {
     let number = number(section, "Baudrate", warnings)?;
     if number <= 1000 {

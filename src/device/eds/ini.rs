@@ -107,7 +107,7 @@ impl Ini {
         ini
     }
 
-    /// The section of a header line, and whether it existed before.
+    /// Opens the section of a header line. Returns its position, and whether it existed before.
     fn open(&mut self, header: &str, line: usize, warnings: &mut Vec<Warning>) -> (usize, bool) {
         let (name, rest) = header.split_once(']').unwrap_or_else(|| {
             warnings.push(Warning::new(line, format!("the section {} has no closing bracket", quoted(header))));
@@ -151,7 +151,8 @@ fn is_prose(section: &str) -> bool {
     matches!(section, "fileinfo" | "comments")
 }
 
-/// The value without a comment after it, if it has one. Inside a word, `#` is no comment: `16#180`, `1.#QNAN`.
+/// Removes the comment after a value; `None` if there is no comment. Inside a word, `#` is no comment: `16#180`,
+/// `1.#QNAN`.
 pub(super) fn without_comment(value: &str) -> Option<&str> {
     let hash = value.char_indices().filter(|&(at, mark)| mark == '#' && !value[..at].ends_with(is_part_of_word));
     let hash = hash.map(|(at, _)| at).next();

@@ -105,7 +105,7 @@ pub struct ObjectFlags {
 pub struct Warning {
     /// The line, counted from 1.
     pub line: usize,
-    /// The index of the object in whose section the line is.
+    /// The index of the object whose section contains the line.
     pub index: Option<u16>,
     /// One sentence. Text from the file is shortened and safe for a terminal.
     pub text: String,
@@ -184,7 +184,7 @@ fn section_index(name: &str) -> Option<u16> {
     u16::from_str_radix(digits, 16).ok().filter(|_| is_object)
 }
 
-/// What to do with a file of another format that is often mistaken for an EDS.
+/// Returns a message for a file of another format that is often used instead of an EDS by mistake.
 fn other_format(bytes: &[u8], text: &str) -> Option<&'static str> {
     let binary: [(&[u8], &str); 4] = [
         (b"PK\x03\x04", "this is a zip archive: unpack it, and use the EDS file in it"),

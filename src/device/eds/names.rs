@@ -29,7 +29,7 @@ pub(super) struct Described {
     pub(super) entry: Entry,
     /// The kind of its object.
     pub(super) kind: Kind,
-    /// The user's name for it.
+    /// The name that the user gave the object (`Denotation`).
     pub(super) denotation: Option<String>,
 }
 
@@ -44,7 +44,7 @@ pub(super) enum Kind {
     Record,
 }
 
-/// Names the entries; `objects` has the names of the objects in the file.
+/// Gives each entry its final name. `objects` contains the names of the objects in the file.
 pub(super) fn dictionary(objects: &BTreeMap<u16, String>, described: Vec<Described>) -> Dictionary {
     let titles = objects;
     let subs = described.iter().map(|described| described.entry.object).filter(|object| object.sub > 0);

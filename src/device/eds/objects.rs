@@ -38,12 +38,12 @@ const VAR: i128 = 7;
 const ARRAY: i128 = 8;
 const RECORD: i128 = 9;
 
-/// The most memory that the entries may take, in bytes: enough for a hundred thousand. A file can describe 254 entries
-/// in three lines.
-const MOST_BYTES: usize = 32 << 20;
+/// Limit for the memory of the entries in bytes, enough for 100,000 entries. A limit is needed, because a file can
+/// describe 254 entries in three lines.
+const MAX_BYTES: usize = 32 << 20;
 
-/// The most PDOs in each direction (CiA 301).
-const PDOS: i128 = 512;
+/// The highest number of PDOs in each direction (CiA 301).
+const MAX_PDOS: i128 = 512;
 
 /// The communication parameters of a PDO: name, bytes. Bit 0 of `CompactPDO` is sub-index 1.
 const PDO_PARAMETERS: [(&str, u8); 6] = [
@@ -58,7 +58,7 @@ const PDO_PARAMETERS: [(&str, u8); 6] = [
 /// Reads every object.
 pub(super) fn read(ini: &Ini, warnings: &mut Vec<Warning>) -> Objects {
     let parts = sections::objects(ini, warnings);
-    let mut reader = Reader { ini, warnings, objects: Objects::default(), room: MOST_BYTES };
+    let mut reader = Reader { ini, warnings, objects: Objects::default(), free_bytes: MAX_BYTES };
     for (index, parts) in &parts {
         reader.object(*index, parts);
     }
@@ -71,7 +71,7 @@ pub(super) struct Reader<'a> {
     pub(super) ini: &'a Ini,
     warnings: &'a mut Vec<Warning>,
     pub(super) objects: Objects,
-    room: usize,
+    free_bytes: usize,
 }
 
 impl Reader<'_> {
@@ -134,7 +134,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The elements of an array that one section describes, except those with their own section.
+    /// Adds the elements of an array that one section describes, except elements with their own section.
     fn elements_of(&mut self, index: u16, main: &Section, last: u8, parts: &Parts) {
         if !parts.subs.contains_key(&0) {
             self.push(ObjectId::new(index, 0), Kind::Array, main, "", &Content::count(Some(last)));
@@ -149,20 +149,20 @@ impl Reader<'_> {
         }
     }
 
-    /// The PDO parameters without a section, if the file describes its PDOs by `CompactPDO` (CiA 306).
+    /// Adds the PDO parameters without a section, if the file describes its PDOs by `CompactPDO` (CiA 306).
     fn compact_pdos(&mut self, parts: &BTreeMap<u16, Parts>) {
         let Some(section) = self.ini.section("deviceinfo") else { return };
         let Some(mask) = number(section, "compactpdo").filter(|mask| *mask > 0) else { return };
         let directions = [("NrOfRXPDO", "RPDO", 0x1400, 0x200), ("NrOfTXPDO", "TPDO", 0x1800, 0x180)];
         for (key, title, first, cob_id) in directions {
-            let count = number(section, &key.to_ascii_lowercase()).unwrap_or_default().clamp(0, PDOS);
+            let count = number(section, &key.to_ascii_lowercase()).unwrap_or_default().clamp(0, MAX_PDOS);
             for pdo in 0..u16::try_from(count).unwrap_or_default() {
                 let described = |index| parts.contains_key(&index);
                 let object = ObjectId::new(first + pdo, 0);
                 if !described(object.index) {
                     self.objects.names.insert(object.index, format!("{title} {} communication parameter", pdo + 1));
                     let default = Scalar::NodeIdPlus(cob_id + 0x100 * u32::from(pdo));
-                    // Only four PDOs have a default identifier; the others are off.
+                    // Only the first four PDOs have a default COB-ID; the others are disabled.
                     let default = if pdo < 4 { default } else { Scalar::Integer(1 << 31) };
                     let is_in_mask = |sub: u8| sub <= 2 || mask >> (sub - 1) & 1 == 1;
                     let last = (1..=6).rev().find(|sub| is_in_mask(*sub));
@@ -204,7 +204,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The entry that its own section describes.
+    /// Adds the entry that a section describes.
     fn section(&mut self, object: ObjectId, kind: Kind, section: &Section) {
         let content = self.content(section);
         let name = section.get("parametername").map_or("", |item| item.value.as_str());
@@ -218,16 +218,16 @@ impl Reader<'_> {
 
     fn push(&mut self, object: ObjectId, kind: Kind, section: &Section, name: &str, content: &Content) {
         let parent = self.objects.names.get(&object.index).map_or(0, String::len);
-        let Some(room) = self.room.checked_sub(content.bytes() + 2 * name.len() + 2 * parent) else {
-            if self.room > 0 {
+        let Some(free_bytes) = self.free_bytes.checked_sub(content.bytes() + 2 * name.len() + 2 * parent) else {
+            if self.free_bytes > 0 {
                 let text =
                     format!("[{}]: all further objects are skipped: they would take too much memory", section.shown);
                 self.warn(section.line, text);
             }
-            self.room = 0;
+            self.free_bytes = 0;
             return;
         };
-        self.room = room;
+        self.free_bytes = free_bytes;
         if let Some(value) = &content.parameter_value {
             self.objects.parameter_values.insert(object, value.clone());
             let line = section.get("parametervalue").map_or(section.line, |item| item.line);
@@ -253,7 +253,7 @@ impl Reader<'_> {
         self.objects.described.push(Described { entry, kind, denotation: None });
     }
 
-    /// `[…Value]` and `[…Denotation]`, for the entries from `start` on.
+    /// Reads `[…Value]` and `[…Denotation]` for the entries from `start` on.
     fn lists(&mut self, start: usize, parts: &Parts) {
         let mut values = list(parts.values);
         let mut denotations = list(parts.denotations);
@@ -291,7 +291,7 @@ impl Reader<'_> {
     }
 }
 
-/// A list by sub-index; the first of two equal numbers is used.
+/// Returns the items of a list by sub-index. If a number occurs twice, the first item is used.
 fn list(section: Option<&Section>) -> BTreeMap<u8, &super::ini::Item> {
     let mut list = BTreeMap::new();
     for (sub, item) in section.map(Section::numbered).unwrap_or_default() {

@@ -24,7 +24,7 @@ pub(super) struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// The first section that describes something, else the first that belongs to the object.
+    /// The section of the object or of its first sub-object; without these, the first list.
     pub(super) fn first(&self) -> Option<&'a Section> {
         let described = self.main.or_else(|| self.subs.values().min_by_key(|sub| sub.line).copied());
         described.or(self.names).or(self.values).or(self.denotations)
@@ -96,11 +96,11 @@ fn role(name: &str) -> Role {
 }
 
 fn four_digits(index: &str) -> Option<u16> {
-    let ours = index.len() == 4 && index.bytes().all(|digit| digit.is_ascii_hexdigit());
-    ours.then(|| u16::from_str_radix(index, 16).ok()).flatten()
+    let is_index = index.len() == 4 && index.bytes().all(|digit| digit.is_ascii_hexdigit());
+    is_index.then(|| u16::from_str_radix(index, 16).ok()).flatten()
 }
 
-/// Warns about objects that are listed but not described, and the reverse.
+/// Warns about objects that are listed but not described, or described but not listed.
 fn check_lists(ini: &Ini, objects: &BTreeMap<u16, Parts>, warnings: &mut Vec<Warning>) {
     let mut listed: BTreeMap<u16, usize> = BTreeMap::new();
     for section in

@@ -6,7 +6,7 @@ const CP1252_80: [char; 32] = [
     '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{fffd}', 'ž', 'Ÿ',
 ];
 
-/// The text of a file, with `\n` at the end of every line.
+/// Decodes a file to text with `\n` as line end.
 ///
 /// CiA 306 allows ISO 646 only. Real files are UTF-8 or UTF-16, with or without byte order mark, or Windows-1252. A
 /// file that is not valid UTF-8 is read as Windows-1252. Control characters become U+FFFD, so that a name cannot move
@@ -15,7 +15,7 @@ pub(super) fn decode(bytes: &[u8]) -> String {
     let text = match bytes {
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
-        // Without a mark: the first two characters are ASCII.
+        // UTF-16 without byte order mark: the first two characters are ASCII.
         [first, 0, second, 0, ..] if *first > 0 && *second > 0 => utf16(bytes, u16::from_le_bytes),
         [0, first, 0, second, ..] if *first > 0 && *second > 0 => utf16(bytes, u16::from_be_bytes),
         [0xef, 0xbb, 0xbf, rest @ ..] => utf8_or_cp1252(rest),
@@ -50,11 +50,11 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
     char::decode_utf16(units).map(|unit| unit.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
 }
 
-/// A piece of a file for a message: short, and without control characters.
+/// Shortens text of a file for a message, and escapes control characters.
 pub(super) fn shown(text: &str) -> String {
-    const LONGEST: usize = 40;
-    let mut short: String = text.chars().take(LONGEST).collect();
-    if text.chars().nth(LONGEST).is_some() {
+    const MAX_CHARS: usize = 40;
+    let mut short: String = text.chars().take(MAX_CHARS).collect();
+    if text.chars().nth(MAX_CHARS).is_some() {
         short.push('…');
     }
     short.escape_debug().to_string()

@@ -7,7 +7,7 @@ use crate::canopen::value::{DataType, ValueError, parse_hex};
 use crate::device::description::Access;
 use crate::device::scalar::Scalar;
 
-/// A value, and a doubt about it.
+/// A value, and the reason if it is doubtful.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Reading<T> {
     pub(super) value: T,
@@ -20,14 +20,14 @@ impl<T> Reading<T> {
     }
 }
 
-/// A value; if that fails, the value without a comment after it, or without quotes around it. CiA 306 allows neither,
-/// but real files contain them.
+/// Parses a value. If that fails, parses it without a comment after it, or without quotes around it. CiA 306 allows
+/// neither, but real files contain them.
 fn tolerant<T>(text: &str, parse: impl Fn(&str) -> Option<T>) -> Option<T> {
     let plain = |text: &str| parse(text).or_else(|| parse(text.strip_prefix('"')?.strip_suffix('"')?.trim()));
     plain(text).or_else(|| without_comment(text).and_then(plain))
 }
 
-/// The code of a data type: a number, or hexadecimal digits without `0x` (`1B`, `0003h`).
+/// Parses the code of a data type: a number, or hexadecimal digits without `0x` (`1B`, `0003h`).
 pub(super) fn type_code(text: &str) -> Option<Reading<i128>> {
     let hex = |text: &str| {
         let value = plain_integer(&format!("0x{}", text.strip_suffix(['h', 'H']).unwrap_or(text)))?.value;
@@ -36,7 +36,7 @@ pub(super) fn type_code(text: &str) -> Option<Reading<i128>> {
     integer(text).or_else(|| tolerant(text, hex))
 }
 
-/// An integer: decimal, `0x…`, `…h`, or octal with a leading zero. A comment after it is ignored.
+/// Parses an integer: decimal, `0x…`, `…h`, or octal with a leading zero. A comment after it is ignored.
 pub(super) fn integer(text: &str) -> Option<Reading<i128>> {
     tolerant(text, plain_integer)
 }
@@ -48,8 +48,8 @@ fn plain_integer(text: &str) -> Option<Reading<i128>> {
     };
     let sign = if negative { -1 } else { 1 };
     let radix = |digits: &str, radix: u32| {
-        let ours = !digits.is_empty() && digits.chars().all(|digit| digit.is_digit(radix));
-        ours.then(|| i128::from_str_radix(digits, radix).ok()?.checked_mul(sign)).flatten()
+        let is_valid = !digits.is_empty() && digits.chars().all(|digit| digit.is_digit(radix));
+        is_valid.then(|| i128::from_str_radix(digits, radix).ok()?.checked_mul(sign)).flatten()
     };
     if let Some(hex) = hexadecimal(digits) {
         return radix(hex, 16).map(Reading::sure);
@@ -78,12 +78,12 @@ fn hexadecimal(text: &str) -> Option<&str> {
     text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"))
 }
 
-/// The digits of `180h`, which CiA 306 does not allow.
+/// Returns the digits of `180h`, a form that CiA 306 does not allow.
 fn with_h(text: &str) -> Option<&str> {
     text.strip_suffix(['h', 'H'])
 }
 
-/// A switch: `0`, `1`, or a word.
+/// Parses a switch: `0`, `1`, or a word.
 pub(super) fn switch(text: &str) -> Option<bool> {
     tolerant(text, |text| match text.to_ascii_lowercase().as_str() {
         "true" | "yes" => Some(true),
@@ -92,7 +92,7 @@ pub(super) fn switch(text: &str) -> Option<bool> {
     })
 }
 
-/// An access type, in any letter case. `rwr` and `rww` restrict PDOs; by SDO both are `rw`.
+/// Parses an access type in any letter case. `rwr` and `rww` differ from `rw` only for PDOs.
 pub(super) fn access(text: &str) -> Option<Access> {
     tolerant(text, |text| match text.to_ascii_lowercase().as_str() {
         "ro" | "r" => Some(Access::Ro),
@@ -103,7 +103,7 @@ pub(super) fn access(text: &str) -> Option<Access> {
     })
 }
 
-/// A default, limit or parameter value of a type, in the form that [`Scalar::encode`] takes. `None` for an empty value.
+/// Parses a default, limit or parameter value of a type for [`Scalar::encode`]. `None` for an empty value.
 ///
 /// # Errors
 /// The reason why the text is not a value of the type.
@@ -116,7 +116,7 @@ pub(super) fn scalar(text: &str, data_type: DataType) -> Result<Option<Reading<S
     let form = || format!("{} is not a value of type {data_type}", quoted(text));
     let reading = match data_type {
         DataType::VisibleString | DataType::UnicodeString => Some(Reading::sure(Scalar::Text(text.to_owned()))),
-        DataType::Boolean => tolerant(text, truth),
+        DataType::Boolean => tolerant(text, boolean),
         DataType::Unsigned(_) => tolerant(text, |text| number(text, None)),
         DataType::Integer(bytes) => tolerant(text, |text| number(text, Some(bytes))),
         DataType::Real32 => tolerant(text, |text| real(text, 8)),
@@ -127,7 +127,7 @@ pub(super) fn scalar(text: &str, data_type: DataType) -> Result<Option<Reading<S
         DataType::TimeOfDay | DataType::TimeDifference => tolerant(text, |text| time(text, data_type)),
     };
     let reading = reading.ok_or_else(form)?;
-    // The check uses the encoder itself; a formula must fit every node-ID.
+    // The encoder checks the range. A formula must fit every node-ID, so the highest one is used.
     match reading.value.encode(data_type, NodeId::MAX) {
         Ok(_) => Ok(Some(reading)),
         Err(ValueError::Range { low, high, .. }) => {
@@ -137,7 +137,7 @@ pub(super) fn scalar(text: &str, data_type: DataType) -> Result<Option<Reading<S
     }
 }
 
-fn truth(text: &str) -> Option<Reading<Scalar>> {
+fn boolean(text: &str) -> Option<Reading<Scalar>> {
     let bit = match text.to_ascii_lowercase().as_str() {
         "true" => 1,
         "false" => 0,
@@ -146,8 +146,8 @@ fn truth(text: &str) -> Option<Reading<Scalar>> {
     Some(Reading::sure(Scalar::Integer(bit)))
 }
 
-/// An integer, a formula with `$NODEID`, or a number with only zeros after the point. `signed` is the width of a signed
-/// type, in which `0xFF…` is the bit pattern of a negative number.
+/// Parses an integer, a formula with `$NODEID`, or a number with only zeros after the point. `signed` is the width of a
+/// signed type in bytes: a hexadecimal number is then a bit pattern and can be negative.
 fn number(text: &str, signed: Option<u8>) -> Option<Reading<Scalar>> {
     if text.to_ascii_uppercase().contains(NODE_ID) {
         return formula(text);
@@ -160,7 +160,7 @@ fn number(text: &str, signed: Option<u8>) -> Option<Reading<Scalar>> {
         return Some(Reading { value: integer_scalar(value), doubt });
     }
     let real: f64 = text.parse().ok()?;
-    // 2^53: above it, a REAL64 cannot represent every integer.
+    // Above 2^53, a REAL64 cannot represent every integer.
     if real.fract() != 0.0 || real.abs() >= 9_007_199_254_740_992.0 {
         return None;
     }
@@ -181,7 +181,7 @@ fn from_bit_pattern(value: i128, bytes: u8) -> i128 {
 
 const NODE_ID: &str = "$NODEID";
 
-/// `$NODEID+0x180`, with the terms in any order.
+/// Parses `$NODEID+0x180`, with the terms in any order.
 fn formula(text: &str) -> Option<Reading<Scalar>> {
     let mut nodes = 0;
     let mut sum: i128 = 0;
@@ -195,13 +195,13 @@ fn formula(text: &str) -> Option<Reading<Scalar>> {
             doubt = number.doubt.or(doubt);
         }
     }
-    // An object with a sum of the node-ID has at most 32 bits.
+    // Objects with `$NODEID` have at most 32 bits.
     let sum = u32::try_from(sum).ok().filter(|_| nodes == 1)?;
     Some(Reading { value: Scalar::NodeIdPlus(sum), doubt })
 }
 
-/// A REAL: `1.5`, `1e3`, with a decimal comma, or hexadecimal. A hexadecimal number with all `digits` is a bit pattern:
-/// 3F800000h is 1.0.
+/// Parses a REAL: `1.5`, `1e3`, with a decimal comma, or hexadecimal. A hexadecimal number with `digits` digits is a
+/// bit pattern: 3F800000h is 1.0.
 fn real(text: &str, digits: usize) -> Option<Reading<Scalar>> {
     if let Ok(number) = text.parse::<f64>() {
         return Some(Reading::sure(Scalar::Real(number)));
@@ -224,13 +224,13 @@ fn real(text: &str, digits: usize) -> Option<Reading<Scalar>> {
     Some(Reading { value: Scalar::Real(number), doubt: Some(format!("{} {how} {number}", quoted(text))) })
 }
 
-/// A time as a number of 48 bits, the only form in CiA 306.
+/// Parses a time as a 48-bit number, the only form in CiA 306.
 fn time(text: &str, data_type: DataType) -> Option<Reading<Scalar>> {
     let number = u64::try_from(plain_integer(text)?.value).ok()?;
     let bytes = number.to_le_bytes();
     let text = data_type.decode(&bytes[..6]).ok()?.to_string();
-    let whole = data_type.encode_text(&text).is_ok_and(|back| back == bytes[..6]) && bytes[6..] == [0, 0];
-    whole.then(|| Reading::sure(Scalar::Text(text)))
+    let is_valid = data_type.encode_text(&text).is_ok_and(|back| back == bytes[..6]) && bytes[6..] == [0, 0];
+    is_valid.then(|| Reading::sure(Scalar::Text(text)))
 }
 
 #[cfg(test)]

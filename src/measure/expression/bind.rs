@@ -39,7 +39,7 @@ pub struct AvailableSignals<'a> {
     signals: Vec<AvailableSignal>,
     /// Nodes whose objects can all be read by address.
     readable: Vec<Layout<'a>>,
-    /// The names of objects, in lower case, with the name as in [`Source`].
+    /// Objects by node and name in lower case, each with its name as in [`Source`].
     objects: BTreeMap<(NodeId, String), AvailableSignal>,
 }
 
@@ -105,7 +105,7 @@ impl<'a> AvailableSignals<'a> {
         nodes
     }
 
-    /// A signal of a node with its name as in [`Source`]; `None` if the node has no such signal.
+    /// Finds a signal of a node. The result has the name as in [`Source`]; `None` if the node has no such signal.
     fn find(&self, node: NodeId, signal: &SignalName) -> Option<AvailableSignal> {
         let name = signal.name();
         let known = self.signals.iter().find(|known| known.node == node && known.name == name).cloned();
@@ -404,13 +404,13 @@ const SECOND: Unit = Unit(0x0003_0000);
 const HERTZ: Unit = Unit(0x0020_0000);
 
 /// The unit of a function of all samples.
-fn aggregate_dimension(function: Function, of: Dimension) -> Dimension {
-    match (function, of) {
+fn aggregate_dimension(function: Function, argument: Dimension) -> Dimension {
+    match (function, argument) {
         (Function::Rate, _) => Dimension::In(HERTZ, Offsets::Known(0.0)),
         (Function::Gap, _) => Dimension::In(SECOND, Offsets::Known(0.0)),
         (Function::Count | Function::Invalid, _) => Dimension::None,
         (Function::Noise, Dimension::In(unit, _)) => Dimension::In(unit, Offsets::Known(0.0)),
-        (_, of) => of,
+        (_, argument) => argument,
     }
 }
 

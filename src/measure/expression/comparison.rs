@@ -27,7 +27,7 @@ impl Arrivals {
         self.last = now;
     }
 
-    /// Whether the signal stopped: no sample for five of its intervals, and for at least one second.
+    /// Whether the signal stopped: no sample for five usual intervals, and for at least one second.
     fn has_stopped(&self, end: Mono) -> bool {
         let intervals = self.count.saturating_sub(1).max(1);
         let usual = self.last.since(self.first) / intervals;
@@ -68,7 +68,7 @@ impl InputGroup {
     }
 }
 
-/// The use of the value of an input group.
+/// What the value of an input group is used for.
 #[derive(Clone, Copy, Debug)]
 enum Purpose {
     /// A rule for each sample.
@@ -82,13 +82,13 @@ enum Purpose {
 /// The statistics of a formula.
 #[derive(Clone, Debug)]
 enum Figures {
-    /// The formula has one input: other expressions use the same statistics.
+    /// The formula has one input, so other expressions can use the same statistics.
     Shared(SeriesId),
     Own(Box<Statistics>),
 }
 
 impl Figures {
-    /// The statistics of a formula of an expression that is bound now. `places` are the places of its inputs.
+    /// Creates the statistics of a formula. `places` contains the place of each input in `signals`.
     fn new(formula: &Formula, places: &[usize], signals: &mut SharedSignals) -> Figures {
         let mut inputs = Vec::new();
         formula.inputs(&mut inputs);
@@ -113,7 +113,7 @@ impl Figures {
     }
 }
 
-/// When a sample was received, the time since the first sample, and the status from the device.
+/// The time when a sample was received, the time since the first sample, and the status from the device.
 pub(super) type SampleContext = (Stamp, Duration, Option<Status>);
 
 /// One expression and its state during a measurement.
@@ -149,7 +149,7 @@ impl Comparison {
             (InputGroup::new(inputs), purpose)
         };
         let mut groups = Vec::new();
-        // Shown values come first: a violation contains the values of its own sample.
+        // Shown values are evaluated first, because a violation contains the values of its own sample.
         let own = |(_, figures): &(usize, &Figures)| matches!(figures, Figures::Own(_));
         for (at, _) in shown.iter().enumerate().filter(own) {
             let shown = &bound.shown[at];
@@ -191,7 +191,7 @@ impl Comparison {
     /// Adds a value of an input.
     pub(super) fn add(&mut self, input: usize, value: Option<f64>, digits: Option<u8>, context: SampleContext) {
         if let ([only], [arrivals]) = (&mut self.values[..], &mut self.arrivals[..]) {
-            // Nothing waits for another input.
+            // With one input, no value waits for another input.
             *only = value;
             arrivals.add(context.0.mono);
             self.digits[input] = digits.or(self.digits[input]);
@@ -270,8 +270,8 @@ impl Comparison {
 
     /// The present value of each function.
     fn aggregate_values(&self, signals: &SharedSignals) -> Vec<Option<f64>> {
-        let of = |(aggregate, figures): (&Aggregate, &Figures)| value(aggregate.function, figures.get(signals));
-        self.bound.aggregates.iter().zip(&self.aggregates).map(of).collect()
+        let value_of = |(aggregate, figures): (&Aggregate, &Figures)| value(aggregate.function, figures.get(signals));
+        self.bound.aggregates.iter().zip(&self.aggregates).map(value_of).collect()
     }
 
     fn count(&self, signals: &SharedSignals) -> u64 {
@@ -281,8 +281,9 @@ impl Comparison {
 
     /// The number of samples without a valid value. Samples inside `invalid()` do not count.
     fn invalid(&self, signals: &SharedSignals) -> u64 {
-        let counts = |aggregate: &Aggregate| aggregate.function != Function::Invalid;
-        let aggregates = self.bound.aggregates.iter().zip(&self.aggregates).filter(|(aggregate, _)| counts(aggregate));
+        let is_counted = |aggregate: &Aggregate| aggregate.function != Function::Invalid;
+        let aggregates =
+            self.bound.aggregates.iter().zip(&self.aggregates).filter(|(aggregate, _)| is_counted(aggregate));
         let aggregates = aggregates.map(|(_, figures)| figures.get(signals).invalid());
         self.evaluated.iter().map(|&(_, invalid)| invalid).chain(aggregates).max().unwrap_or(0)
     }
@@ -372,7 +373,7 @@ impl Comparison {
         self.bound.shown.iter().zip(&self.shown).map(quantity).collect()
     }
 
-    /// The part of a formula that determines its digits: `min`, `max` and `| |` keep those of their argument.
+    /// The part of a formula that determines its digits: `min`, `max` and `| |` keep the digits of their argument.
     fn digits_source<'a>(&'a self, formula: &'a Formula) -> Option<&'a Formula> {
         match formula {
             Formula::Aggregate(at) => {

@@ -14,7 +14,7 @@ use crate::device::unit::Unit;
 pub(super) enum Offsets {
     /// The number: 1 in a temperature, 0 in a difference of two temperatures.
     Known(f64),
-    /// A number in the expression. The other side decides.
+    /// A number in the expression. The other side of the operator decides.
     Literal,
     /// Unknown, for example in a product of two temperatures.
     Unknown,
@@ -47,13 +47,13 @@ pub(super) struct Typed {
 }
 
 impl Typed {
-    /// Whether the quantity is a number with a unit in the expression.
+    /// Whether the quantity is a number written with a unit.
     fn is_literal(&self) -> bool {
         matches!(self.dimension, Dimension::In(_, Offsets::Literal))
     }
 
     /// Replaces `C` and `F` by degrees if `other` is a temperature.
-    fn beside(mut self, other: Dimension) -> Typed {
+    fn resolve_degrees(mut self, other: Dimension) -> Typed {
         if let (Dimension::In(unit, Offsets::Literal), Dimension::In(other, _)) = (self.dimension, other) {
             self.dimension = Dimension::In(unit.beside(other), Offsets::Literal);
         }
@@ -131,14 +131,14 @@ pub(super) fn limit_without_unit(sides: &[&Typed]) -> Option<LimitWithoutUnit> {
     (!is_stated).then_some(LimitWithoutUnit { limit, unit })
 }
 
-fn beside_each_other(first: Typed, second: Typed) -> (Typed, Typed) {
+fn resolve_degrees_of_both(first: Typed, second: Typed) -> (Typed, Typed) {
     let (one, other) = (first.dimension, second.dimension);
-    (first.beside(other), second.beside(one))
+    (first.resolve_degrees(other), second.resolve_degrees(one))
 }
 
-/// Converts two quantities to one unit: that of a number with a unit, else that of the first quantity.
+/// Converts two quantities to one unit: the unit of a number written with a unit, otherwise the first unit.
 pub(super) fn to_one_unit(first: Typed, second: Typed) -> Result<(Typed, Typed), LocatedError> {
-    let (first, second) = beside_each_other(first, second);
+    let (first, second) = resolve_degrees_of_both(first, second);
     if second.is_literal() {
         Ok((first.converted(&second)?, second))
     } else {
@@ -149,7 +149,7 @@ pub(super) fn to_one_unit(first: Typed, second: Typed) -> Result<(Typed, Typed),
 
 /// Converts a value and its two limits to one unit.
 pub(super) fn within(value: Typed, low: Typed, high: Typed) -> Result<[Typed; 3], LocatedError> {
-    let (low, high) = (low.beside(value.dimension), high.beside(value.dimension));
+    let (low, high) = (low.resolve_degrees(value.dimension), high.resolve_degrees(value.dimension));
     let value = match [&high, &low].into_iter().find(|limit| limit.is_literal()) {
         Some(limit) => value.converted(limit)?,
         None => value,
@@ -167,21 +167,21 @@ pub(super) fn calculate(
     name: String,
 ) -> Result<Typed, LocatedError> {
     let start = first.at;
-    let (first, second) = beside_each_other(first, second);
+    let (first, second) = resolve_degrees_of_both(first, second);
     let (first, second) = match operator {
         Operator::Multiply => (first, second),
         // The measured value determines the unit of a sum.
         _ if first.is_literal() && !second.is_literal() && operator != Operator::Divide => {
-            let first = addend(first, &second)?;
+            let first = convert_term(first, &second)?;
             (first, second)
         }
         Operator::Add | Operator::Subtract => {
-            let second = addend(second, &first)?;
+            let second = convert_term(second, &first)?;
             (first, second)
         }
         Operator::Divide => match (first.dimension, second.dimension) {
             (Dimension::In(..), Dimension::In(..)) => {
-                let second = addend(second, &first)?;
+                let second = convert_term(second, &first)?;
                 (first, second)
             }
             _ => (first, second),
@@ -197,7 +197,7 @@ pub(super) fn calculate(
 
 /// Converts one term of a sum. A number in another temperature unit is rejected: it could be a temperature or a
 /// difference. In the unit of the other term, both are the same number.
-fn addend(term: Typed, to: &Typed) -> Result<Typed, LocatedError> {
+fn convert_term(term: Typed, to: &Typed) -> Result<Typed, LocatedError> {
     if let (Dimension::In(from, Offsets::Literal), Dimension::In(unit, offsets)) = (term.dimension, to.dimension)
         && offsets != Offsets::Known(0.0)
         && from.convert(1.0, unit).is_some()

@@ -81,12 +81,12 @@ impl Evaluator {
             let reason =
                 |node: NodeId| missing.iter().find(|missing| missing.node == node).map(|missing| &missing.reason);
             let for_each = expression.applies_to_each_node();
-            let named = expression.signals().into_iter().find_map(|signal| reason(signal.node?));
+            let reason_of_named = expression.signals().into_iter().find_map(|signal| reason(signal.node?));
             let has_signals = |node: &NodeId| available.has_all(*node, expression);
             let may_skip = skip_unsupported && nodes.iter().any(has_signals);
             for node in nodes.iter().take(if for_each { nodes.len() } else { 1 }) {
-                let own = reason(*node).filter(|_| for_each);
-                if let Some(reason) = named.or(own) {
+                let own_reason = reason(*node).filter(|_| for_each);
+                if let Some(reason) = reason_of_named.or(own_reason) {
                     let node = Some(*node).filter(|_| for_each);
                     self.without_data.push(Verdict::no_data(expression.text(), node, reason.clone()));
                 } else if !for_each || !may_skip || has_signals(node) {

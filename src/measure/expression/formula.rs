@@ -54,7 +54,7 @@ impl Formula {
         value.is_finite().then_some(value)
     }
 
-    /// The formula with the number 0 for all inputs. For formulas with one input.
+    /// Returns the formula with input 0 in place of its only input.
     pub(super) fn of_first_input(&self) -> Formula {
         let inner = |formula: &Formula| Box::new(formula.of_first_input());
         match self {
@@ -67,7 +67,7 @@ impl Formula {
         }
     }
 
-    /// The formula with its constant part calculated. Called once, for formulas that are evaluated for each sample.
+    /// Calculates the constant parts once, for formulas that are evaluated for each sample.
     fn fold(&mut self) {
         let is_constant = |formula: &Formula| {
             let mut inputs = Vec::new();
@@ -157,7 +157,7 @@ impl Rule {
         })
     }
 
-    /// Calculates the constant parts of its formulas, for example a limit in another unit.
+    /// Calculates the constant parts of the formulas, for example a limit in another unit.
     pub(super) fn fold(&mut self) {
         match self {
             Rule::Compare(first, _, second, _) => [first, second].into_iter().for_each(Formula::fold),

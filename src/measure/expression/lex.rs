@@ -27,7 +27,7 @@ pub(super) enum Token {
 const SIGNS: [&str; 16] =
     ["..", "<=", ">=", "==", "!=", "<", ">", "+", "-", "*", "/", "(", ")", "|", "\u{2264}", "\u{2265}"];
 
-/// Signs of other languages, and what to use here.
+/// Signs of programming languages, and what to write instead.
 const FOREIGN_SIGNS: [(&str, &str); 3] = [("&&", "and"), ("=", "=="), ("!", "not")];
 
 /// Returns all tokens of a text with their positions.
@@ -67,11 +67,11 @@ fn token(text: &str, at: Position) -> Result<(Token, usize), LocatedError> {
     }
     if is_letter(first) {
         let word = name(text);
-        if let Some(length) = figure(text) {
+        if let Some(length) = figure_length(text) {
             let what = Wanted::Signal(text[..length].to_owned());
             return Ok((Token::Signal(SignalName { node: None, what, at }), length));
         }
-        if let Some(length) = numbered(text, word) {
+        if let Some(length) = numbered_name_length(text, word) {
             let what = Wanted::Signal(text[..length].to_owned());
             return Ok((Token::Signal(SignalName { node: None, what, at }), length));
         }
@@ -98,7 +98,7 @@ fn token(text: &str, at: Position) -> Result<(Token, usize), LocatedError> {
     Err(LocatedError::new(at, format!("unexpected character \"{first}\"")))
 }
 
-/// A letter of a name or of a unit: also the degree sign and both micro signs.
+/// Whether a character is a letter of a name or unit. The degree sign and both micro signs are letters.
 fn is_letter(character: char) -> bool {
     character.is_ascii_alphabetic() || matches!(character, '\u{b0}' | '\u{b5}' | '\u{3bc}')
 }
@@ -121,8 +121,8 @@ fn name(text: &str) -> &str {
     &text[..end]
 }
 
-/// The length of the name of a figure of the bus or of a node: `bus.load`, `node.heartbeat.max`.
-fn figure(text: &str) -> Option<usize> {
+/// Returns the length of the name of a bus or node figure: `bus.load`, `node.heartbeat.max`.
+fn figure_length(text: &str) -> Option<usize> {
     let mut length = FIGURES.into_iter().find(|prefix| text.starts_with(prefix))?.len();
     loop {
         length += name(&text[length..]).len();
@@ -133,8 +133,8 @@ fn figure(text: &str) -> Option<usize> {
     }
 }
 
-/// The length of a name with a sub-index: `ai-input-pv:1`.
-fn numbered(text: &str, word: &str) -> Option<usize> {
+/// Returns the length of a name with a sub-index: `ai-input-pv:1`.
+fn numbered_name_length(text: &str, word: &str) -> Option<usize> {
     let digits = text[word.len()..].strip_prefix(':')?;
     let length = digits.bytes().take_while(u8::is_ascii_digit).count();
     (length > 0).then_some(word.len() + 1 + length)
@@ -216,7 +216,7 @@ fn is_signal(text: &str) -> bool {
     }
 }
 
-/// `e3` is an exponent: `5.e3` is not a signal of node 5.
+/// Whether a word is an exponent such as `e3`: `5.e3` is not a signal of node 5.
 fn is_exponent(word: &str) -> bool {
     let digits = word.trim_start_matches(['e', 'E']);
     word.len() == digits.len() + 1 && !digits.is_empty() && digits.bytes().all(|digit| digit.is_ascii_digit())
