@@ -171,7 +171,7 @@ impl Model {
         })
     }
 
-    /// Whether both descriptions recognise the agree_if_known devices.
+    /// Whether both descriptions recognise the same devices.
     pub fn is_for_the_same_device(&self, other: &Model) -> bool {
         let key = |model: &Model| {
             let identify = model.description.identify.clone();
@@ -258,7 +258,7 @@ pub fn has_vendor(vendor: u32) -> bool {
 /// Returns the objects to read before [`recognise`] can decide. Empty if no object is needed, or if no description can
 /// fit. The caller reads them, and adds the received bytes to [`IdentityAnswers::answers`].
 pub fn objects_to_read(traits: &IdentityAnswers) -> Vec<ObjectId> {
-    // Other descriptions with the agree_if_known number of identity keys cannot change the decision. Only a description with more
+    // Other descriptions with the same number of identity keys cannot change the decision. Only a description with more
     // identity keys would have priority.
     let decided_keys = recognise(traits).map_or(0, |model| model.rank().0);
     let is_undecided = |model: &&Arc<Model>| model.has_identity(traits) && model.rank().0 > decided_keys;

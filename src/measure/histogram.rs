@@ -1,9 +1,9 @@
 //! The distribution of times, in memory that does not grow with their number.
 //!
-//! Times are counted in buckets. Up to 8.192 us, a bucket is one nanosecond wide; above, less than 0.025 % of the time.
-//! A quantile is the middle of its bucket, so its error is at most 0.0125 %. The shortest and the longest time are
-//! exact. Buckets are allocated in pages at first use, so similar times need few pages. A bucket counts up to four
-//! billion.
+//! Times are counted in buckets. Up to 8.192 us, a bucket is one nanosecond wide; above, its width is less than 0.025 %
+//! of the time. A quantile is the middle of its bucket, so its error is at most 0.0125 %. The shortest and the longest
+//! time are exact. Buckets are allocated in pages at first use, so similar times need few pages. A bucket counts up to
+//! four billion.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ const FINE_BITS: u32 = 12;
 /// Buckets in a page.
 const PAGE: usize = 64;
 /// The upper limit for buckets: 39 hours. All longer times are in one bucket.
-const LONGEST: u64 = (1 << 47) - 1;
+const LONGEST_NS: u64 = (1 << 47) - 1;
 
 /// Counts of times.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,7 +55,7 @@ impl Histogram {
 
     /// The time that a `share` (0 to 1) of all times does not exceed. The error is at most 0.0125 %.
     pub fn quantile(&self, share: f64) -> Option<Duration> {
-        self.place(share, self.buckets())
+        self.clamped_rank(share, self.buckets())
     }
 
     /// The distance from `centre` that a `share` (0 to 1) of all times does not exceed. The error is at most 0.0125 %
@@ -84,9 +84,9 @@ impl Histogram {
         })
     }
 
-    fn place(&self, share: f64, buckets: impl Iterator<Item = (u64, u64)>) -> Option<Duration> {
+    fn clamped_rank(&self, share: f64, buckets: impl Iterator<Item = (u64, u64)>) -> Option<Duration> {
         let time = self.rank(share, buckets)?;
-        // The middle of a bucket may be beyond the times in it.
+        // The middle of a bucket may be outside the range of the counted times.
         Some(time.clamp(self.shortest?, self.longest?))
     }
 
@@ -104,7 +104,7 @@ impl Histogram {
 }
 
 fn nanoseconds(time: Duration) -> u64 {
-    u64::try_from(time.as_nanos()).unwrap_or(LONGEST).min(LONGEST)
+    u64::try_from(time.as_nanos()).unwrap_or(LONGEST_NS).min(LONGEST_NS)
 }
 
 /// The bucket of a time: its power of two above 2^13 ns, and the twelve bits after the leading one.
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn every_time_is_in_its_bucket() {
         let mut time = 0;
-        while time < LONGEST {
+        while time < LONGEST_NS {
             for time in [time, time + 1, time.saturating_sub(1)] {
                 let middle = middle(bucket(time));
                 assert!(middle.abs_diff(time) * 8000 <= time, "{time} became {middle}");

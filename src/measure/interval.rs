@@ -1,4 +1,4 @@
-//! The usual interval of messages. From it follow gaps, and the time after which the sender is silent.
+//! The usual interval of messages. It determines gaps, and the time after which a sender is silent.
 
 use crate::bus::Mono;
 use std::time::Duration;
@@ -16,7 +16,7 @@ const MIN_SILENCE: Duration = Duration::from_secs(1);
 #[derive(Clone, Debug, Default)]
 pub struct IntervalTracker {
     last: Option<Mono>,
-    /// In nanoseconds: every frame of a recording changes it.
+    /// In nanoseconds, because it is calculated again for every frame of a recording.
     usual: Option<u64>,
 }
 
@@ -57,7 +57,7 @@ impl IntervalTracker {
         self.last.is_some()
     }
 
-    /// The time since the last message, if it is longer than usual.
+    /// The time since the last message, if it is so long that the sender is silent.
     pub fn silence(&self, now: Mono) -> Option<Duration> {
         let limit = (self.usual().unwrap_or_default() * SILENCE_FACTOR).max(MIN_SILENCE);
         self.last.map(|last| now.since(last)).filter(|&silence| silence > limit)

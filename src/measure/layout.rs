@@ -57,7 +57,7 @@ pub struct Rules {
     pub scaling: Scaling,
     /// The bits of the status object.
     pub status_bits: StatusBits,
-    /// Numbers that replace the value.
+    /// Numbers that the device sends instead of the value.
     pub markers: Markers,
 }
 
@@ -171,8 +171,8 @@ impl Layout<'_> {
     /// `None` if no source states it.
     pub fn data_type(&self, object: ObjectId) -> Option<DataType> {
         let described = self.model.and_then(|model| {
-            let is_open = model.untyped.contains(&object);
-            model.dictionary.get(object).filter(|_| !is_open).map(|entry| entry.data_type)
+            let is_untyped = model.untyped.contains(&object);
+            model.dictionary.get(object).filter(|_| !is_untyped).map(|entry| entry.data_type)
         });
         let of_profile = || self.profile.and_then(|profile| profiles::data_type(profile, object));
         let described = described.or_else(|| self.type_of_signal(object));
@@ -221,7 +221,7 @@ impl Layout<'_> {
         self.find_in_family(self.signals.iter().find(|known| known.name == signal)?, family_offset)
     }
 
-    /// The unit of an object: that of its channel, else the fixed one of the description.
+    /// The unit of an object: the unit of its channel, else the fixed unit in the description.
     pub fn unit_of(&self, object: ObjectId) -> Option<Unit> {
         let fixed = || self.model?.description.object(object)?.unit.as_deref().and_then(Unit::from_symbol);
         let of_value = |signal: &&Signal| !signal.is_value(object) || signal.rules.scaling == Scaling::Digits;
@@ -301,7 +301,8 @@ impl Signal {
     }
 }
 
-/// Whether a mapped field of `bits` bits holds a value of this type. An unsigned number may lack bits of its last byte.
+/// Whether a mapped field of `bits` bits holds a value of this type. Boolean and unsigned fields may be up to 7 bits
+/// shorter.
 pub fn fits(data_type: DataType, bits: u8) -> bool {
     let width = data_type.width().map(|width| 8 * width);
     match data_type {

@@ -52,11 +52,12 @@ const MAX_DIGITS: u8 = 9;
 /// A REAL32 nearer to zero than this is not a measured value: it is probably an INTEGER32 up to 2.3e8.
 const SMALLEST_REAL: f32 = 1e-30;
 
-/// An overload starts outside the measuring range by this share of the range (CiA 404 devices: 3.125 %).
+/// A value is an overload if it is outside the measuring range by more than this share of the range (CiA 404 devices:
+/// 3.125 %).
 const OVERLOAD_MARGIN: f64 = 0.03125;
 
 impl Reading {
-    /// The reading of the process value of a signal. `source` is the number of the source.
+    /// Creates the reading for the process value of a signal. `source` is the number of the source.
     pub fn of_signal(signal: &Signal, data_type: Option<DataType>, source: usize) -> Reading {
         Reading {
             source,
@@ -70,11 +71,11 @@ impl Reading {
         }
     }
 
-    /// The reading of an object by its address. The process value and the net value of a signal are read as the signal.
-    /// Other values of a channel (limits) have the decimal digits of the channel.
+    /// Creates the reading for an object by its address. The process value and the net value of a signal are read as
+    /// the signal. Other values of a channel (limits) have the decimal digits of the channel.
     pub fn of_object(layout: Layout<'_>, object: ObjectId, data_type: Option<DataType>, source: usize) -> Reading {
         if let Some(signal) = layout.measured_signal(object) {
-            // The net value is not compared with the measuring range: a tare shifts it.
+            // The net value is not compared with the measuring range, because a tare shifts it.
             let has_status = signal.status.is_some() || !signal.is_value(object);
             return Reading { has_status, ..Reading::of_signal(signal, data_type, source) };
         }
@@ -86,7 +87,7 @@ impl Reading {
         Reading { scaling, ..Reading::plain(data_type, source) }
     }
 
-    /// The reading of a number without unit and decimal digits.
+    /// Creates the reading for a number without unit and decimal digits.
     pub fn plain(data_type: Option<DataType>, source: usize) -> Reading {
         let range = MeasuringRange::Unknown;
         let rules = Rules::default();
@@ -123,8 +124,8 @@ impl Reading {
         }
     }
 
-    /// The sample for the bytes of a value and, if there are any, its status bits. `None` if the bytes do not fit the
-    /// type.
+    /// Creates the sample from the bytes of a value and its status bits, if there are any. `None` if the bytes do not
+    /// fit the type.
     pub fn sample(&self, at: Stamp, bytes: &[u8], status_bits: Option<u64>) -> Option<Sample> {
         let without_value =
             |status, doubt| Sample { at, source: self.source, value: None, status, raw: Raw::new(bytes), doubt };
@@ -154,15 +155,15 @@ impl Reading {
         let status_bits = status_bits.map(|bits| self.rules.status_bits.to_cia_404(bits));
         let marker = if let Value::Integer(_) | Value::Unsigned(_) = value { self.marker_bits(&value) } else { None };
         let reported = marker.or(status_bits).map(Status::from_bits);
-        let marked = !number.is_finite() || self.has_marker && is_smallest(&value, data_type);
+        let is_marked = !number.is_finite() || self.has_marker && is_smallest(&value, data_type);
         let mut status = match reported {
-            Some((Status::Ok, _)) if marked => Some(Status::Invalid),
+            Some((Status::Ok, _)) if is_marked => Some(Status::Invalid),
             Some((status, _)) => Some(status),
-            None if marked => Some(Status::Invalid),
+            None if is_marked => Some(Status::Invalid),
             None if self.has_marker => Some(Status::Ok),
             None => None,
         };
-        let mut valid = !marked && reported.is_none_or(|(_, valid)| valid);
+        let mut valid = !is_marked && reported.is_none_or(|(_, valid)| valid);
         if valid && matches!(self.scaling, Scaling::Digits(_)) && is_at_end(&value, data_type) {
             if self.range == MeasuringRange::Unknown {
                 doubt = doubt.or(Some(Doubt::EndOfType));
@@ -181,7 +182,7 @@ impl Reading {
         Some(Sample { value: valid.then_some(number), ..without_value(status, doubt) })
     }
 
-    /// The status that an integer shows by a marker, as bits of 6150h.
+    /// The status of an integer that is a marker, as bits of 6150h.
     fn marker_bits(&self, value: &Value) -> Option<u64> {
         let number = match value {
             Value::Integer(number) => *number,
@@ -193,8 +194,8 @@ impl Reading {
     /// Sets the status of a sample from an overload that the device reports by an emergency or its error register.
     /// `channel: None` means all channels. A signal with its own status keeps it.
     pub fn report_overload(&self, sample: &mut Sample, channel: Option<u8>) {
-        let is_meant = self.channel.is_some_and(|own| channel.is_none_or(|channel| channel == own));
-        if let Some(value) = sample.value.filter(|_| is_meant && !self.has_status && !self.has_marker) {
+        let applies = self.channel.is_some_and(|own| channel.is_none_or(|channel| channel == own));
+        if let Some(value) = sample.value.filter(|_| applies && !self.has_status && !self.has_marker) {
             sample.status = Some(sample.status.unwrap_or(self.range.nearer_end(value.as_f64())));
         }
     }
@@ -211,7 +212,7 @@ impl Reading {
 }
 
 impl MeasuringRange {
-    /// The overload that a value outside the measuring range shows.
+    /// Returns the overload if the value is outside the measuring range and the margin.
     pub fn overload(self, value: f64) -> Option<Status> {
         let MeasuringRange::Known(start, end) = self else { return None };
         let margin = (end - start).abs() * OVERLOAD_MARGIN;
@@ -224,7 +225,8 @@ impl MeasuringRange {
         }
     }
 
-    /// The direction of a reported overload: the nearer end of the range, else the sign of the value.
+    /// The direction of a reported overload: the nearer end of the range or, without a known range, the sign of the
+    /// value.
     fn nearer_end(self, value: f64) -> Status {
         let middle = if let MeasuringRange::Known(start, end) = self { f64::midpoint(start, end) } else { 0.0 };
         if value < middle { Status::OverloadLow } else { Status::OverloadHigh }

@@ -82,17 +82,17 @@ impl Statistics {
         self.gaps += 1;
     }
 
-    /// Intervals that were gaps.
+    /// The number of intervals that were gaps.
     pub fn gaps(&self) -> u64 {
         self.gaps
     }
 
-    /// Samples, valid and invalid.
+    /// The number of samples, valid and invalid.
     pub fn count(&self) -> u64 {
         self.valid + self.invalid
     }
 
-    /// Samples without a value.
+    /// The number of samples without a value.
     pub fn invalid(&self) -> u64 {
         self.invalid
     }
@@ -171,7 +171,7 @@ mod tests {
         assert_eq!(statistics.longest_interval(), Duration::from_millis(10));
     }
 
-    /// Each sample adds less to the mean than its last bit can hold.
+    /// Each sample changes the mean by less than the last bit of the mean.
     #[test]
     fn precision_does_not_fall_with_the_number_of_samples() {
         // A billion samples of 1e6, then many that are a little greater.
@@ -198,7 +198,7 @@ mod tests {
         assert!((found / deviation - 1.0).abs() < 1e-6, "{found:e}, {deviation:e}");
     }
 
-    /// Values from 1 to 1e12: the sums are far too large for the next term.
+    /// With values from 1 to 1e12, the sums have no digits left for the next term.
     #[test]
     fn extreme_values_keep_precision() {
         let mut statistics = Statistics::default();
@@ -222,7 +222,7 @@ mod tests {
         let mut at = Duration::ZERO;
         for n in 0..1000u64 {
             statistics.add(Some(1.0), at);
-            // 10 ms, every tenth 100 us late and the one after it early by as much, one 50 ms.
+            // Intervals of 10 ms: every tenth is 100 us longer, the next one 100 us shorter. One is 50 ms.
             let late = if n % 10 == 0 { 100 } else { 0 };
             let early = if n % 10 == 1 { 100 } else { 0 };
             at += Duration::from_micros(if n == 500 { 50_000 } else { 10_000 + late - early });

@@ -11,7 +11,7 @@ use crate::master::{Error as MasterError, SdoError};
 pub enum Error {
     /// The bus fails.
     Bus(BusError),
-    /// Ctrl-C.
+    /// The user pressed Ctrl-C.
     Interrupted,
     /// The node did not carry out a transfer: it rejected it, did not answer or violated the protocol.
     ///
@@ -62,7 +62,7 @@ pub enum Error {
     Name(NameError),
     /// The node restarted in the middle of a change.
     Restarted(NodeId),
-    /// No boot-up message came after a reset.
+    /// No boot-up message was received after a reset.
     NoBootUp(NodeId),
 }
 
@@ -77,7 +77,7 @@ pub struct NameError {
     pub title: Option<String>,
     /// Whether several objects have this name in the EDS.
     pub is_shared: bool,
-    /// The full names of these objects; else at most three similar names, the nearest first.
+    /// The full names of the objects that share the name; else at most three similar names, the nearest first.
     pub nearest: Vec<String>,
 }
 
@@ -110,7 +110,7 @@ impl From<MasterError> for Error {
     }
 }
 
-/// The value of this type; the bytes if they do not fit the type.
+/// Decodes data as a value of this type. Returns the bytes if they do not fit the type.
 pub(super) fn shown(data: &[u8], data_type: DataType) -> Value {
     data_type.decode(data).unwrap_or_else(|_| Value::Bytes(data.to_vec()))
 }

@@ -9,7 +9,7 @@
 //! - [`transfers`]: the SDO transfers of other masters, assembled from their frames;
 //! - [`overheard`]: the objects that other masters read and write;
 //! - [`mod@offline`]: a node from its description, without a bus;
-//! - [`names`]: the objects, types and signals behind names.
+//! - [`names`]: finds the objects, types and signals for names.
 //!
 //! Errors are types ([`Error`]); their texts are in `output`.
 

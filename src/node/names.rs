@@ -16,7 +16,7 @@ use crate::measure::layout::{PROCESS_VALUES, Signal};
 use std::collections::BTreeSet;
 
 impl Node {
-    /// 1001h.
+    /// The error register (1001h).
     pub const ERROR_REGISTER: ObjectId = ObjectId::new(0x1001, 0);
 
     /// The bits of the error register that mean an overload, if the node has a signal without its own status.
@@ -38,7 +38,7 @@ impl Node {
         described.or_else(|| standard::find(name)).or_else(spelled)
     }
 
-    /// The facts about an object in the description, beyond its type.
+    /// The entry of an object in the device description, with limits and meanings.
     pub fn described(&self, object: ObjectId) -> Option<&ObjectEntry> {
         self.model.as_ref()?.description.object(object)
     }
@@ -60,11 +60,11 @@ impl Node {
         described.is_some_and(|entry| !entry.access.is_writable())
     }
 
-    /// The type of an object, from the description or the standard; `None` if it is unknown or the description leaves
-    /// it open.
+    /// The type of an object, from the description or the standard; `None` if it is unknown or missing in the
+    /// description.
     pub fn known_type(&self, object: ObjectId) -> Option<DataType> {
-        let is_open = self.model.as_ref().is_some_and(|model| model.untyped.contains(&object));
-        self.entry(object).filter(|_| !is_open).map(|entry| entry.data_type)
+        let is_untyped = self.model.as_ref().is_some_and(|model| model.untyped.contains(&object));
+        self.entry(object).filter(|_| !is_untyped).map(|entry| entry.data_type)
     }
 
     /// The type of an object for a setting: as [`Layout::data_type`], else by the index (CiA 404), else UNSIGNED32. Do
@@ -84,7 +84,7 @@ impl Node {
         ObjectId::new(signal.value_object.0.index & 0xf000 | low, signal.channel)
     }
 
-    /// The object with this name for a signal. The sub-index is the channel; with a single signal, it may be missing.
+    /// Finds the object of a signal by `name:channel`, or by `name` alone if the node has a single signal.
     pub fn object_of(&self, signal: &Signal, name: &str) -> Option<ObjectId> {
         let dictionary = &self.model.as_ref()?.dictionary;
         let numbered = dictionary.find(&format!("{name}:{}", signal.channel));
@@ -97,7 +97,7 @@ impl Node {
         self.layout().resolve(item)
     }
 
-    /// The objects that share this name in the EDS, else those with similar names, the nearest first.
+    /// The objects that share this name in the EDS, else the objects with similar names, the nearest first.
     pub fn objects_like(&self, name: &str) -> Vec<String> {
         let Some(model) = &self.model else { return nearest(name, standard::names()) };
         match model.dictionary.namesakes(name) {
@@ -106,7 +106,7 @@ impl Node {
         }
     }
 
-    /// The names of objects with similar names, then those of the signals.
+    /// The similar names of objects, then the names of all signals.
     pub fn names_like(&self, name: &str) -> Vec<String> {
         let mut names = self.objects_like(name);
         names.extend(self.signals.iter().map(|signal| signal.name.clone()));
@@ -207,15 +207,15 @@ pub fn encode(node: &Node, object: ObjectId, data_type: DataType, text: &str) ->
     encoded.or_else(|error| word(node, object, data_type, text).ok_or(Error::Value { node: node.id, object, error }))
 }
 
-/// The bytes for a word instead of a number. The word is a signature, from the description, or a sensor type (6110h).
+/// Encodes a word instead of a number: a signature, a word of the description, or a sensor type (6110h).
 pub fn word(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> Option<Vec<u8>> {
     if !matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_)) {
         return None;
     }
     let is_sensor = object.index == 0x6110 && object.sub > 0 && node.identity.profile() == Some(MEASURING);
-    let is_meant = |word: &str| word.eq_ignore_ascii_case(text) || is_sensor && sensor::is_same(word, text);
+    let is_match = |word: &str| word.eq_ignore_ascii_case(text) || is_sensor && sensor::is_same(word, text);
     let explained = || {
-        let mut alike = node.described(object)?.values.iter().filter(|(_, word)| is_meant(word));
+        let mut alike = node.described(object)?.values.iter().filter(|(_, word)| is_match(word));
         alike.next().filter(|_| alike.next().is_none()).map(|(code, _)| *code)
     };
     let standard = || sensor::code(text).filter(|_| is_sensor).map(u64::from);
@@ -248,7 +248,7 @@ pub fn nearest(word: &str, known: impl Iterator<Item = String>) -> Vec<String> {
     near.into_iter().take(3).map(|(_, name)| name).collect()
 }
 
-/// Bytes as a value of a type; the bytes if they do not fit.
+/// Decodes bytes as a value of a type. Returns the bytes if they do not fit.
 pub fn value_of(data: &[u8], data_type: DataType) -> Value {
     super::error::shown(data, data_type)
 }

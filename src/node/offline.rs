@@ -8,7 +8,7 @@ use crate::device::catalog::Model;
 use crate::measure::layout::Tpdo;
 use std::sync::Arc;
 
-/// A node of which only the description is known. Signals and TPDOs are those of the description.
+/// Creates a node from its description, with the signals and TPDOs of the description.
 pub fn offline(id: NodeId, model: &Arc<Model>) -> Node {
     let mut node = Node { model: Some(Arc::clone(model)), is_identified: true, ..Node::new(id) };
     node.signals = model.description.signals.iter().map(|entry| described(&node, entry)).collect();

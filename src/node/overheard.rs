@@ -21,7 +21,7 @@ pub struct Overheard {
 }
 
 impl Overheard {
-    /// Handles a frame. Returns the node and the object after a new value, or after the first rejected read.
+    /// Handles a frame. Returns node and object if the frame completes a new value or the first rejected read.
     pub fn take(&mut self, received: &Received) -> Option<(NodeId, ObjectId)> {
         self.transfers.take(received);
         let mut learned = None;
@@ -38,9 +38,9 @@ impl Overheard {
 
     /// Forgets the objects of a node for which `is_forgotten` is true.
     pub fn forget(&mut self, node: NodeId, is_forgotten: impl Fn(ObjectId) -> bool) {
-        let stays = |(of, object): &(NodeId, ObjectId)| *of != node || !is_forgotten(*object);
-        self.known.retain(|key, _| stays(key));
-        self.refused.retain(stays);
+        let is_kept = |(of, object): &(NodeId, ObjectId)| *of != node || !is_forgotten(*object);
+        self.known.retain(|key, _| is_kept(key));
+        self.refused.retain(is_kept);
         self.transfers.forget(node, is_forgotten);
     }
 

@@ -23,14 +23,14 @@ pub fn read_values<A: ObjectReader>(master: &mut A, items: &[Item]) -> Result<Ve
     Ok(values.collect())
 }
 
-/// The largest number of consecutive unanswered reads of a node that answers the reads of other objects.
+/// After more consecutive reads without an answer, a node is treated as silent, even if it answers other objects.
 const MAX_SILENT: u32 = 8;
 
 /// Reads objects that a device may not have, or may not answer. An object without a valid answer does not affect the
 /// others. The answers of optional objects are kept: each of them is read once.
 pub struct Reader<'a, A> {
     pub(super) master: &'a mut A,
-    /// An object that each node answered. Not 1000h, because some devices answer only this object.
+    /// For each node, an object that it answered. 1000h is not used, because some devices answer only this object.
     answered: BTreeMap<NodeId, ObjectId>,
     /// The errors of nodes that do not answer any more, or whose answers come from two devices.
     failed: BTreeMap<NodeId, SdoError>,
@@ -42,27 +42,28 @@ pub struct Reader<'a, A> {
 type Silences = BTreeMap<NodeId, (SdoError, u32)>;
 
 impl<'a, A: ObjectReader> Reader<'a, A> {
-    /// A reader that has read nothing.
+    /// Creates a reader without known answers.
     pub fn new(master: &'a mut A) -> Reader<'a, A> {
         Reader { master, answered: BTreeMap::new(), failed: BTreeMap::new(), known: BTreeMap::new() }
     }
 
     /// Reads objects. One result for each, in their order.
     ///
-    /// After a silent sub-index, the other sub-indices of its object are not read. A node that is silent twice in a row
-    /// must answer an object that it answered before. Otherwise its remaining objects have the same error.
+    /// After a sub-index without an answer, the other sub-indices of the object are not read. If a node does not answer
+    /// twice in a row, an object that it answered before is read again. Without an answer, the remaining objects of the
+    /// node get the same error.
     ///
     /// # Errors
     /// Failures of the bus, and Ctrl-C. The failure of one device is in its results.
     pub fn read(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, A::Stop> {
         let mut results: Vec<Option<Result<Answer, SdoError>>> = objects.iter().map(|_| None).collect();
-        let mut open: Vec<usize> = (0..objects.len()).collect();
+        let mut pending: Vec<usize> = (0..objects.len()).collect();
         let (mut repeated, mut silences) = (BTreeSet::new(), Silences::new());
-        while !open.is_empty() {
-            let asked: Vec<(NodeId, ObjectId)> = open.iter().map(|&at| objects[at]).collect();
+        while !pending.is_empty() {
+            let asked: Vec<(NodeId, ObjectId)> = pending.iter().map(|&at| objects[at]).collect();
             let (mut rest, mut unanswered) = (Vec::new(), BTreeSet::new());
             let before = repeated.len();
-            for (at, result) in open.into_iter().zip(self.master.read_objects(&asked)?) {
+            for (at, result) in pending.into_iter().zip(self.master.read_objects(&asked)?) {
                 let (node, object) = objects[at];
                 match result.as_ref().map_err(|error| &error.failure) {
                     // This object was not read, because an earlier read got no answer.
@@ -75,7 +76,7 @@ impl<'a, A: ObjectReader> Reader<'a, A> {
                         let error = result.as_ref().err().cloned();
                         silences.entry(node).or_insert_with(|| (error.expect("an error"), 0)).1 += 1;
                     }
-                    // `None` may be late answers of one device.
+                    // With `None`, the answers may be late answers of one device.
                     Err(SdoFailure::TwoDevices(Some(_)) | SdoFailure::NotWritten(_))
                         if self.master.tolerates_two_devices() => {}
                     Err(SdoFailure::TwoDevices(Some(_)) | SdoFailure::NotWritten(_) | SdoFailure::TimeLimit(_)) => {
@@ -102,7 +103,7 @@ impl<'a, A: ObjectReader> Reader<'a, A> {
                 !unanswered.contains(&(node, object.index)) && !self.failed.contains_key(&node)
             });
             let is_stuck = rest.len() == asked.len() && repeated.len() == before;
-            open = if is_stuck { Vec::new() } else { rest };
+            pending = if is_stuck { Vec::new() } else { rest };
         }
         let unread = |(node, object)| {
             let operation = Operation::Read;
@@ -113,7 +114,7 @@ impl<'a, A: ObjectReader> Reader<'a, A> {
         Ok(results.map(|(result, &object)| result.unwrap_or_else(|| Err(unread(object)))).collect())
     }
 
-    /// Finds out which of the nodes that are silent twice in a row still answer.
+    /// Checks the nodes that did not answer twice in a row. A node that does not answer any object has failed.
     fn check_silent(&mut self, silences: &Silences) -> Result<(), A::Stop> {
         for (&node, (error, count)) in silences.iter().filter(|(_, (_, count))| *count > 1) {
             let is_alive = match self.answered.get(&node).filter(|_| *count <= MAX_SILENT) {
@@ -129,7 +130,7 @@ impl<'a, A: ObjectReader> Reader<'a, A> {
         Ok(())
     }
 
-    /// The answers of optional objects; `None` without a valid answer.
+    /// Reads optional objects; `None` without a valid answer.
     ///
     /// # Errors
     /// A node does not answer any more; failures of the bus, and Ctrl-C.
@@ -165,7 +166,7 @@ impl<'a, A: ObjectReader> Reader<'a, A> {
         Ok(results)
     }
 
-    /// The values of optional objects; `None` without a valid answer, or if the bytes do not fit the type.
+    /// Reads the values of optional objects; `None` without a valid answer, or if the bytes do not fit the type.
     ///
     /// # Errors
     /// A node does not answer any more; failures of the bus, and Ctrl-C.

@@ -12,16 +12,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The bits on the wire of a full transmit queue of 10 frames, each with its answer.
+/// The bits of a full transmit queue: 10 requests and their answers, 135 bits each.
 const FULL_QUEUE_BITS: u64 = 10 * 2 * 135;
 
 const VENDOR: ObjectId = ObjectId::new(0x1018, 1);
 
-/// The time from the last request of a round to the next round. After the last round, at least this time is left for
-/// answers.
+/// The time from the last request of a round to the next round. After the last round, the scan waits at least this time
+/// for answers.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(50);
 
-/// How often the master checks whether all requests were sent.
+/// The interval at which the scan checks whether all requests were sent.
 const SENDING_STEP: Duration = Duration::from_millis(2);
 
 /// How long to wait for heartbeats after the first requests.
@@ -64,7 +64,7 @@ impl Presence {
         }
     }
 
-    /// The end of a request to this node.
+    /// Handles the result of a request to this node.
     fn on_result(&mut self, result: Result<Answer, SdoError>, node: Option<NodeId>, is_only: bool) {
         let has_answered = result.as_ref().map_or_else(
             |error| !matches!(error.failure, SdoFailure::NoAnswer { .. } | SdoFailure::Cancelled),
@@ -96,7 +96,7 @@ impl Presence {
             }
             None if received.frame.is_remote() => {}
             None => {
-                // A late answer to a cancelled request.
+                // This can be a late answer to a cancelled request.
                 self.answered.extend(received.frame.id().sdo_response_node());
                 if let Some(node) = tpdo_node(received.frame.id()) {
                     self.tpdos.entry(node).or_default().insert(received.frame.id());
@@ -105,7 +105,7 @@ impl Presence {
         }
     }
 
-    /// Also counts emergencies and TPDOs, by the identifiers of the predefined connection set.
+    /// Handles a frame, and also detects nodes by emergencies and TPDOs of the predefined connection set.
     fn on_any_frame(&mut self, received: &Received) {
         self.on_frame(received);
         let frame = &received.frame;
@@ -130,16 +130,16 @@ fn tpdo_node(id: CanId) -> Option<NodeId> {
 /// Reads the device type (1000h) of every node, all in parallel, and from the second round on the vendor (1018h:1),
 /// because some devices do not answer one of them.
 ///
-/// A heartbeat, a boot-up message or a late answer also counts. Nodes without an answer are asked
-/// `rounds` times. All rounds share one wait: `timeout` after the last request of the first round. If states are
-/// unknown, waits at least 200 ms after this request.
+/// A heartbeat, a boot-up message or a late answer also detects a node. Nodes without an answer are asked `rounds`
+/// times. All rounds share one wait, which ends `timeout` after the last request of the first round. If states are
+/// unknown, waits for heartbeats until 200 ms after this request, or until `timeout` if it is shorter.
 ///
 /// The caller sets the filters: with [`Master::listen_to`] no TPDOs are received.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.
 pub fn find(master: &mut Master<'_>, nodes: &[NodeId], timeout: Duration, rounds: u32) -> Result<Presence, Error> {
-    // On a slow bus a request stays in the queue for longer than the time-out.
+    // On a slow bus a request may stay in the queue for longer than the time-out.
     let bit_rate = master.bus().bit_rate().filter(|&rate| rate > 0);
     let queue = Duration::from_micros(bit_rate.map_or(0, |rate| FULL_QUEUE_BITS * 1_000_000 / u64::from(rate)));
     let timeout = timeout + queue;
@@ -158,7 +158,7 @@ pub fn find(master: &mut Master<'_>, nodes: &[NodeId], timeout: Duration, rounds
             false => end.max(asked_at + REPEAT_INTERVAL + queue),
         })?;
     }
-    // Once more, for nodes that were booting and missed the requests.
+    // Asks once more the nodes that were booting and missed the requests.
     let booted = without_answer(nodes, &presence, |node| presence.booted.contains(&node));
     ask(master, (&booted, VENDOR), timeout, &mut presence, |asked_at| asked_at + timeout)?;
     wait_for_states(master, asked_at + timeout.min(HEARTBEAT_TIMEOUT), &mut presence)?;
@@ -169,8 +169,8 @@ fn without_answer(nodes: &[NodeId], presence: &Presence, is_wanted: impl Fn(Node
     nodes.iter().copied().filter(|&node| !presence.answered.contains(&node) && is_wanted(node)).collect()
 }
 
-/// Asks nodes once, and waits for their answers until `end`, which depends on the moment when the last request was
-/// sent. Returns this moment.
+/// Asks nodes once, and waits for their answers until `end(t)`. `t` is the time when the last request was sent. Returns
+/// `t`.
 fn ask(
     master: &mut Master<'_>,
     (nodes, object): (&[NodeId], ObjectId),
@@ -179,31 +179,31 @@ fn ask(
     end: impl Fn(Mono) -> Mono,
 ) -> Result<Mono, Error> {
     let mut asked_at = master.now();
-    let mut open: BTreeMap<Ticket, NodeId> = BTreeMap::new();
+    let mut pending: BTreeMap<Ticket, NodeId> = BTreeMap::new();
     for &node in nodes {
-        open.insert(master.start(Request::read(node, object).once().within(timeout)), node);
+        pending.insert(master.start(Request::read(node, object).once().within(timeout)), node);
     }
     let (mut is_sending, mut until) = (true, asked_at);
-    while !open.is_empty() {
+    while !pending.is_empty() {
         let step = if is_sending { master.now() + SENDING_STEP } else { until };
         let waited = wait(master, step, Policy::Command, |master, event| {
             match event {
-                Happening::Sdo(ticket, result) => presence.on_result(result, open.remove(&ticket), nodes.len() == 1),
+                Happening::Sdo(ticket, result) => presence.on_result(result, pending.remove(&ticket), nodes.len() == 1),
                 event => presence.on_event(&event),
             }
             let is_sent = is_sending && !master.is_sending();
-            if open.is_empty() || is_sent { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if pending.is_empty() || is_sent { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         if is_sending {
             asked_at = master.now();
             is_sending = master.is_sending();
-            // The time-out of the only request also shows a frame that looks like its answer.
+            // With one node, waits until its request times out: the error contains a frame that looks like its answer.
             until = if nodes.len() == 1 { end(asked_at) + SENDING_STEP } else { end(asked_at) };
         } else if waited.done().is_none() {
             break;
         }
     }
-    master.forget(open.keys().copied());
+    master.forget(pending.keys().copied());
     Ok(asked_at)
 }
 

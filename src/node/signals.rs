@@ -1,4 +1,4 @@
-//! The signals of a node: those of its description, the channels of CiA 404, the measured values of its profile, or the
+//! The signals of a node: from its description, the channels of CiA 404, the measured values of its profile, or the
 //! contents of its TPDOs.
 
 use super::Node;
@@ -9,11 +9,11 @@ use crate::device::scale::{Decimal, Scale};
 use crate::device::unit::Unit;
 use crate::measure::layout::{MeasuringRange, Rules, Scaling, Signal, is_channel};
 
-/// A signal of the description, without unit and digits.
+/// Creates a signal from the description. Unit and digits in the device are not read yet.
 pub(crate) fn described(node: &Node, entry: &SignalEntry) -> Signal {
     let has_digits = entry.digits.is_some() || entry.unit.is_some() || is_channel(entry.channel);
-    let otherwise = if has_digits { Scaling::Digits } else { Scaling::Plain };
-    let scaling = entry.scale.map_or(otherwise, Scaling::Fixed);
+    let default_scaling = if has_digits { Scaling::Digits } else { Scaling::Plain };
+    let scaling = entry.scale.map_or(default_scaling, Scaling::Fixed);
     let mut rules = Rules { scaling, markers: entry.markers.clone(), ..Rules::default() };
     if let Some(bits) = &entry.status_bits {
         rules.status_bits = bits.clone();
@@ -33,7 +33,7 @@ pub(crate) fn described(node: &Node, entry: &SignalEntry) -> Signal {
     }
 }
 
-/// A channel of CiA 404 on a device without a description, without unit and digits.
+/// Creates a signal for a CiA 404 channel of a device without a description. Unit and digits are not read yet.
 pub(crate) fn channel(node: &Node, value: ObjectId) -> Signal {
     let mut signal = plain(node, value);
     (signal.name, signal.channel) = (format!("ch{}", value.sub), value.sub);
@@ -41,7 +41,7 @@ pub(crate) fn channel(node: &Node, value: ObjectId) -> Signal {
     signal
 }
 
-/// A signal without scaling: an object of a profile, or the contents of a TPDO.
+/// Creates a signal without scaling: an object of a profile, or the contents of a TPDO.
 fn plain(node: &Node, object: ObjectId) -> Signal {
     let layout = node.layout();
     Signal {
@@ -81,8 +81,8 @@ pub(crate) fn can_have_channels(node: &Node) -> bool {
     )
 }
 
-/// The measured values of the profile of a node. With each comes the object that shows whether the device has the
-/// value: the count of an array, else the value itself.
+/// The measured values of the profile of a node, each with the object that shows whether the device has the value: the
+/// count of an array, else the value itself.
 pub(crate) fn profile_values(node: &Node) -> impl Iterator<Item = (Measured, ObjectId)> + use<> {
     let measured = node.identity.profile().map_or(&[][..], profiles::measured);
     let shown = node.model.clone().filter(|model| !model.dictionary.is_empty());
@@ -100,14 +100,14 @@ pub(crate) fn values_of(row: Measured, number: Option<u64>) -> Vec<ObjectId> {
     (1..=count).map(|sub| ObjectId::new(row.index, sub)).collect()
 }
 
-/// The object with the step of a signal of a profile. A description can state another unit or factor.
+/// The step of a signal of a profile; `None` if the description states another unit or factor.
 pub(crate) fn step(node: &Node, signal: &Signal) -> Option<Step> {
     let is_plain = !signal.has_channel() && signal.rules.scaling == Scaling::Plain;
     let step = profiles::step(node.identity.device_type?, signal.value_object.0).filter(|_| is_plain)?;
     (signal.unit.is_none() || signal.unit == Unit::from_symbol(step.unit)).then_some(step)
 }
 
-/// Scales a signal by its step, if the device has one.
+/// Scales a signal by its step. `number` is the value of the step object, if the device has one.
 pub(crate) fn set_step(signal: &mut Signal, step: Step, number: Option<u64>) {
     let Some(factor) = number.and_then(|number| i64::try_from(number).ok()).filter(|&number| number > 0) else {
         return;
@@ -134,8 +134,8 @@ pub(crate) fn unit_and_digits(node: &Node, signal: &Signal) -> [Option<ObjectId>
     [unit_object(node, signal), digits.filter(|_| signal.rules.scaling == Scaling::Digits)]
 }
 
-/// The object with the unit code of a signal: the one in its description, else 6131h of its channel. `None` if the unit
-/// is fixed.
+/// The object with the unit code of a signal: from its description, else 6131h of its channel. `None` if the unit is
+/// fixed.
 pub(crate) fn unit_object(node: &Node, signal: &Signal) -> Option<ObjectId> {
     let entry = entry(node, signal);
     let is_fixed = entry.is_some_and(|entry| entry.fixed_unit.is_some())

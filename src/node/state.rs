@@ -1,8 +1,8 @@
 //! NMT states and commands, confirmed if possible.
 //!
 //! A state is confirmed by a boot-up message, a heartbeat, the answer to node guarding, or SDO. A stopped node has no
-//! SDO: if it answered before and does not answer now, it is stopped. An SDO answer proves only that a node is not
-//! stopped.
+//! SDO: if it answered before the command and does not answer after it, it is stopped. An SDO answer proves only that a
+//! node is not stopped.
 
 use super::error::Error;
 use super::read::read_values;
@@ -41,7 +41,7 @@ pub enum Proof {
     Guarding,
     /// The NMT command of another master. The state is not confirmed.
     Command,
-    /// An SDO request that is no longer answered.
+    /// The node no longer answers SDO requests, so it is stopped.
     Sdo,
     /// No evidence.
     None,
@@ -194,7 +194,7 @@ fn sources(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId,
     Ok(found)
 }
 
-/// The states of nodes. One report for each node, in their order.
+/// Finds the states of nodes. Returns one report for each node, in their order.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C. A node that sends and answers nothing has `is_present: false`.
@@ -216,7 +216,7 @@ pub fn states(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<StateRepo
     Ok(nodes.iter().map(report).collect())
 }
 
-/// The state of one node; `None` if it is unknown.
+/// Finds the state of one node; `None` if it is unknown.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.
@@ -235,7 +235,7 @@ pub fn by_heartbeat(master: &mut Master<'_>, node: NodeId, period: Duration) -> 
     Ok(watch.state(node))
 }
 
-/// Uses node guarding for the nodes for which it is harmless: no heartbeat, no life guarding, no other guarding master.
+/// Reads states by node guarding if this is harmless: no heartbeat, no life guarding, no other guarding master.
 fn guard(
     master: &mut Master<'_>,
     nodes: &[NodeId],
@@ -336,8 +336,8 @@ fn after_change(
         watch.wait(master, until, &|watch| expected.iter().all(|node| watch.lives.get(node) == Some(&target)))?;
     }
     let guarded = guard(master, nodes, before, watch)?;
-    let is_open = |node: &NodeId| !watch.lives.contains_key(node) && !guarded.contains_key(node);
-    let silent: Vec<NodeId> = nodes.iter().copied().filter(is_open).collect();
+    let is_unknown = |node: &NodeId| !watch.lives.contains_key(node) && !guarded.contains_key(node);
+    let silent: Vec<NodeId> = nodes.iter().copied().filter(is_unknown).collect();
     let requests = silent.iter().map(|&node| Request::read(node, HEARTBEAT_TIME)).collect();
     // Heartbeats that arrive in this time are also used.
     let answers = master.transfer(requests, &mut |received| watch.on_frame(received))?;

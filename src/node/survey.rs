@@ -195,14 +195,14 @@ fn identify_with<A: ObjectReader>(
     };
     let identities = identities(reader, nodes, reads_name)?;
     let mut traits: Vec<IdentityAnswers> = identities.iter().map(Identity::traits).collect();
-    let questions: Vec<(usize, ObjectId)> = nodes
+    let extra_reads: Vec<(usize, ObjectId)> = nodes
         .iter()
         .enumerate()
         .filter(|(at, node)| reads_name(**node, &identities[*at]))
         .flat_map(|(at, _)| objects_to_read(&traits[at]).into_iter().map(move |object| (at, object)))
         .collect();
-    let objects: Vec<(NodeId, ObjectId)> = questions.iter().map(|&(at, object)| (nodes[at], object)).collect();
-    for (&(at, object), answer) in questions.iter().zip(reader.answers(&objects)?) {
+    let objects: Vec<(NodeId, ObjectId)> = extra_reads.iter().map(|&(at, object)| (nodes[at], object)).collect();
+    for (&(at, object), answer) in extra_reads.iter().zip(reader.answers(&objects)?) {
         traits[at].answers.extend(answer.and_then(|answer| answer.uploaded).map(|uploaded| (object, uploaded.bytes)));
     }
     let mut found: Vec<Node> = nodes.iter().map(|&node| Node::new(node)).collect();
@@ -290,7 +290,7 @@ fn find_signals<A: ObjectReader>(reader: &mut Reader<'_, A>, nodes: &mut [Node])
     find_objects(reader, nodes, &others)
 }
 
-/// The process value of each channel. `counts` are the values of sub-index 0 of [`PROCESS_VALUES`].
+/// The object with the process value of each channel. `counts` are the values of sub-index 0 of [`PROCESS_VALUES`].
 fn channel_values(node: &Node, counts: &[Option<Value>]) -> Vec<ObjectId> {
     let channels = |value: &Option<Value>| unsigned::<u8>(value.as_ref()).unwrap_or(0).min(199);
     if let Some((&(index, _), count)) = PROCESS_VALUES.iter().zip(counts).find(|(_, count)| channels(count) > 0) {
@@ -305,7 +305,7 @@ fn channel_values(node: &Node, counts: &[Option<Value>]) -> Vec<ObjectId> {
     known.into_iter().map(|(channel, rank)| ObjectId::new(PROCESS_VALUES[rank].0, channel)).collect()
 }
 
-/// The signals of devices without channels of CiA 404.
+/// Finds the signals of devices without channels of CiA 404.
 fn find_objects<A: ObjectReader>(
     reader: &mut Reader<'_, A>,
     nodes: &mut [Node],
@@ -416,7 +416,7 @@ pub fn identify_each(
     read_each(master, nodes, &mut |master, nodes| identify(master, nodes, overrides))
 }
 
-/// Reads nodes in parallel.
+/// A function that reads nodes in parallel.
 type ReadNodes<'a> = &'a mut dyn FnMut(&mut Master<'_>, &[NodeId]) -> Result<Vec<Node>, Error>;
 
 /// Reads all nodes in parallel. If one of them fails, each node is read alone, except those that no longer answer.

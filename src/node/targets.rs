@@ -29,7 +29,7 @@ pub fn all(master: &mut Master<'_>, timeout: Duration, rounds: u32) -> Result<Ve
 
 /// Nodes that were detected only by a TPDO.
 ///
-/// The identifier may belong to a TPDO of another node. So the TPDOs of the answering nodes are read first.
+/// The COB-ID may belong to a TPDO of another node. So the TPDOs of the answering nodes are read first.
 fn nodes_by_tpdo(master: &mut Master<'_>, presence: &Presence) -> Result<Vec<NodeId>, Error> {
     let known = presence.nodes();
     let unknown: Vec<_> = presence.tpdos.iter().filter(|(node, _)| !known.contains(node)).collect();

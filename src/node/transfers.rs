@@ -16,13 +16,13 @@ use open::{Open, Step};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-/// A read without frames for this time has ended.
+/// A read ends after this time without frames.
 const READ_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// A write without frames for this time has ended. Storing to non-volatile memory takes the longest time.
+/// A write ends after this time without frames. Storing to non-volatile memory takes the longest time.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// If the next request follows within this time, the master did not wait for its answer: two masters use the channel.
+/// If another request follows within this time, its master did not wait for the answer: two masters use the channel.
 const SHORTEST_TIMEOUT: Duration = Duration::from_millis(20);
 
 /// The largest number of transfers in progress. A scan starts 127.
@@ -48,12 +48,12 @@ pub enum Outcome {
     Aborted {
         /// The abort code.
         code: AbortCode,
-        /// Whether the master sent it.
+        /// Whether the master sent the abort.
         by_master: bool,
     },
     /// A frame violates the protocol.
     Violation(Violation, Frame),
-    /// No answer came, or no further one.
+    /// No answer was received, or no further answer.
     NoAnswer,
 }
 
@@ -80,7 +80,7 @@ pub struct Transfer {
     pub outcome: Outcome,
 }
 
-/// How a frame belongs to the transfers.
+/// Whether a frame belongs to a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The frame has no COB-ID of an SDO channel.
@@ -107,14 +107,14 @@ impl Transfers {
     pub fn take(&mut self, received: &Received) -> Part {
         self.expire(received.at.mono);
         let frame = &received.frame;
-        let is_taken = if let Some(node) = frame.id().sdo_request_node() {
+        let is_part = if let Some(node) = frame.id().sdo_request_node() {
             self.on_request(node, received)
         } else if let Some(node) = frame.id().sdo_response_node() {
             self.on_answer(node, received)
         } else {
             return Part::OtherFrame;
         };
-        if is_taken { Part::OfTransfer } else { Part::Stray }
+        if is_part { Part::OfTransfer } else { Part::Stray }
     }
 
     /// The next transfer that has ended.
@@ -220,19 +220,19 @@ impl Transfers {
             self.answers_60.insert(node);
         }
         // Segments or blocks follow.
-        let begins = matches!(command >> 5, 5 | 6) || command >> 5 == 2 && command & 0x02 == 0;
-        let index = if is_first { self.end_earlier(index, begins) } else { index };
+        let has_segments = matches!(command >> 5, 5 | 6) || command >> 5 == 2 && command & 0x02 == 0;
+        let index = if is_first { self.end_earlier(index, has_segments) } else { index };
         self.step(index, received)
     }
 
-    /// Ends the transfers of the node before `index`. The request of the transfer at `index` is now answered, and a
-    /// server answers in the order of the requests. If the server `begins` to send segments, it has also ended an
-    /// earlier segmented transfer. Returns the new index.
-    fn end_earlier(&mut self, mut index: usize, begins: bool) -> usize {
+    /// Ends earlier transfers of the node: a server answers requests in their order, and it has answered the request of
+    /// the transfer at `index`. If segments follow (`has_segments`), an earlier segmented transfer has also ended.
+    /// Returns the new index.
+    fn end_earlier(&mut self, mut index: usize, has_segments: bool) -> usize {
         let (node, mut at) = (self.open[index].node, 0);
         while at < index {
             let earlier = &self.open[at];
-            if earlier.node == node && (begins || !earlier.has_begun()) {
+            if earlier.node == node && (has_segments || !earlier.has_begun()) {
                 self.finish(at, None, Outcome::NoAnswer);
                 index -= 1;
             } else {

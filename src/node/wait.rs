@@ -64,7 +64,7 @@ pub enum Until {
 pub trait Waiter {
     /// The result of the wait.
     type Output;
-    /// How it fails.
+    /// The error if the wait fails.
     type Error: From<Error>;
 
     /// How long to wait for the next event. Called before each event.

@@ -69,7 +69,8 @@ pub struct WriteOptions<'a> {
 pub enum Written {
     /// The node acknowledged the write.
     Acknowledged,
-    /// No answer came. The object was read back and has the value. The frame was received instead of the answer.
+    /// No answer was received. The object was read back and has the value. The frame was received instead of the
+    /// answer.
     ReadBack(Option<Frame>),
 }
 
@@ -86,7 +87,7 @@ pub fn write(master: &mut Master<'_>, node: &Node, object: ObjectId, data: &[u8]
 ///
 /// # Errors
 /// - [`Error::Sdo`] if the object is known to be unchanged.
-/// - [`Error::Unknown`] if no answer came and it is unknown whether the node executed the write.
+/// - [`Error::Unknown`] if no answer was received and it is unknown whether the node executed the write.
 /// - [`Error::Width`] if the value is narrower than the object and the node does not accept a size.
 /// - Bus errors and Ctrl-C.
 pub fn write_with(
@@ -245,7 +246,7 @@ fn check_width(
     }
 }
 
-/// Whether the object has the value. `None` for a signature, and for an object that cannot be read.
+/// Reads the object back. Returns whether it has the value; `None` for a signature or an object that cannot be read.
 fn read_back(
     master: &mut Master<'_>,
     node: &Node,
@@ -271,7 +272,7 @@ fn frame_instead_of_answer(error: &SdoError) -> Option<Frame> {
     }
 }
 
-/// Whether the request or its answer may have been lost. After any other failure the node may act later.
+/// Whether the request or its answer may have been lost. After any other failure, the node may execute the write later.
 fn may_be_lost(error: &SdoError) -> bool {
     matches!(error.failure, SdoFailure::NoAnswer { .. } | SdoFailure::Ambiguous | SdoFailure::Disturbed)
 }

@@ -5,10 +5,10 @@
 pub struct Abort(pub u32);
 
 impl Abort {
-    /// The code that a device sends if its manual lists only
-    /// `listed`: the nearest listed code. If no listed code is near, `self`.
+    /// Returns the code that a device sends if its manual lists only `listed`: the nearest listed code. If no listed
+    /// code is near, returns `self`.
     pub(super) fn of_list(self, listed: &[u32]) -> Abort {
-        let kin: &[Abort] = match self {
+        let similar: &[Abort] = match self {
             Abort::VALUE | Abort::TOO_HIGH | Abort::TOO_LOW => &[Abort::VALUE, Abort::TOO_HIGH],
             Abort::NOT_MAPPABLE | Abort::PDO_LENGTH => &[Abort::NOT_MAPPABLE, Abort::VALUE],
             Abort::LENGTH => &[Abort::COMMAND],
@@ -18,7 +18,7 @@ impl Abort {
         };
         let is_listed = |abort: &&Abort| listed.contains(&abort.0);
         let general = &[Abort::GENERAL];
-        let mut candidates = std::iter::once(&self).chain(kin).chain(general);
+        let mut candidates = std::iter::once(&self).chain(similar).chain(general);
         candidates.find(is_listed).copied().unwrap_or(self)
     }
 

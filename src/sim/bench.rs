@@ -58,7 +58,7 @@ use file::{BenchFile, DeviceEntry};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// The word instead of a node-ID for an unconfigured device.
+/// The word that replaces the node-ID of an unconfigured device.
 const UNCONFIGURED: &str = "unconfigured";
 
 /// The bench of `sim` without arguments.
@@ -100,10 +100,10 @@ impl Bench {
             Bench::from_list(DEFAULT)
         } else if Path::new(spec).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
             let path = Path::new(spec);
-            let beside = path.parent().unwrap_or(Path::new(""));
+            let folder = path.parent().unwrap_or(Path::new(""));
             let file = parse_file(&read(path)?)
                 .map_err(|SyntaxError { place, message }| BenchError::Usage(format!("{spec}:{place}: {message}")))?;
-            Bench::build(file, beside).map_err(|error| match error {
+            Bench::build(file, folder).map_err(|error| match error {
                 BenchError::Usage(message) => BenchError::Usage(format!("{spec}: {message}")),
                 io @ BenchError::Io { .. } => io,
             })
@@ -129,36 +129,36 @@ impl Bench {
         Bench::build(file, Path::new(""))
     }
 
-    /// Reads a bench file; `beside` is the folder of the files named in it.
+    /// Reads a bench file; `folder` is the folder of the files named in it.
     ///
     /// # Errors
     /// TOML errors with their place, unknown keys, devices and objects that do not exist.
-    pub fn from_toml(text: &str, beside: &Path) -> Result<Bench, BenchError> {
+    pub fn from_toml(text: &str, folder: &Path) -> Result<Bench, BenchError> {
         let file = parse_file(text)
             .map_err(|SyntaxError { place, message }| BenchError::Usage(format!("{place}: {message}")))?;
-        Bench::build(file, beside)
+        Bench::build(file, folder)
     }
 
-    fn build(file: BenchFile, beside: &Path) -> Result<Bench, BenchError> {
+    fn build(file: BenchFile, folder: &Path) -> Result<Bench, BenchError> {
         if file.device.is_empty() {
             return Err(BenchError::Usage("no device".to_owned()));
         }
         let bit_rate = check_rate(file.bit_rate.unwrap_or(BIT_RATE))?;
         let mut taken = BTreeSet::new();
-        let mut of_kind: BTreeMap<String, u32> = BTreeMap::new();
+        let mut count_by_kind: BTreeMap<String, u32> = BTreeMap::new();
         let mut devices = Vec::new();
         for entry in &file.device {
-            let may_share = entry.duplicate_id || entry.is_plugged();
+            let may_share = entry.duplicate_id || entry.is_partly_connected();
             if let Some(node) = entry.node.filter(|node| !taken.insert(*node) && !may_share) {
                 return Err(BenchError::Usage(format!("two devices with node-ID {node}")));
             }
-            let before = of_kind.entry(entry.kind.clone()).or_default();
-            let setup = entry.setup(file.seed, *before, beside)?;
+            let before = count_by_kind.entry(entry.kind.clone()).or_default();
+            let setup = entry.setup(file.seed, *before, folder)?;
             *before += 1;
             devices.push(Device::new(setup).map_err(|error| BenchError::Usage(format!("{}: {error}", entry.name())))?);
         }
-        let record = file.record.map(|path| beside.join(path));
-        let state = file.state.map(|path| beside.join(path));
+        let record = file.record.map(|path| folder.join(path));
+        let state = file.state.map(|path| folder.join(path));
         Ok(Bench { clock: file.clock.into(), bit_rate, retime: file.retime, record, state, devices })
     }
 
@@ -175,7 +175,7 @@ impl Bench {
     /// The devices. With `state`, they have the settings stored in the last run. With `record`, they have a recorder.
     ///
     /// # Errors
-    /// The record cannot be written; the file with the memory has another format, or another process uses it.
+    /// The record cannot be written; the state file has another format, or another process uses it.
     pub fn into_devices(mut self) -> Result<Vec<Device>, BenchError> {
         if let Some(path) = &self.state {
             let file = StateFile::open(path)?;

@@ -18,7 +18,7 @@ use std::time::Duration;
 /// The first digit of an index: REAL32, INTEGER16, INTEGER24, INTEGER32.
 const FAMILIES: [u16; 4] = [0x6000, 0x7000, 0x8000, 0x9000];
 
-/// The contents of an object.
+/// The value of a channel that an object contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ObjectContent {
     Value,
@@ -29,7 +29,7 @@ enum ObjectContent {
     Highest,
 }
 
-/// The kind of conversion of a number if the unit of its channel changes.
+/// How a number is converted if the unit of its channel changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// A point on the scale: limits, start and end of the range.
@@ -56,7 +56,7 @@ const IN_PV_UNIT: [(u16, Kind); 10] = [
 #[derive(Clone, Debug)]
 pub(super) struct Channels {
     list: Vec<Channel>,
-    shown: BTreeMap<ObjectId, (usize, ObjectContent)>,
+    contents: BTreeMap<ObjectId, (usize, ObjectContent)>,
 }
 
 #[derive(Clone, Debug)]
@@ -65,7 +65,7 @@ struct Channel {
     quantity: Quantity,
     filter: Filter,
     /// The lowest and highest value so far.
-    seen: Option<(f64, f64)>,
+    extremes: Option<(f64, f64)>,
     /// Other objects in the unit of the channel.
     follows: Vec<(ObjectId, Kind)>,
     /// Their numbers at the last change of the unit.
@@ -90,7 +90,7 @@ pub(super) struct Reading {
     /// Decimal digits of an integer; `None` for a real number.
     pub(super) digits: Option<u32>,
     pub(super) overload: Option<Direction>,
-    /// Whether an overload replaces the value itself.
+    /// Whether the device sends a marker instead of the value during an overload.
     pub(super) marker: bool,
 }
 
@@ -107,13 +107,13 @@ impl Channels {
             Some(Channel::new(signal, quantity, filter, model, objects))
         });
         let list: Vec<Channel> = list.collect();
-        let mut shown = BTreeMap::new();
+        let mut contents = BTreeMap::new();
         for (index, channel) in list.iter().enumerate() {
-            channel.shown(objects, list.len() == 1).into_iter().for_each(|(object, shows)| {
-                shown.insert(object, (index, shows));
+            channel.contents(objects, list.len() == 1).into_iter().for_each(|(object, content)| {
+                contents.insert(object, (index, content));
             });
         }
-        Channels { list, shown }
+        Channels { list, contents }
     }
 
     /// Holds a signal at a value: `pressure`, `5.2bar`.
@@ -131,15 +131,15 @@ impl Channels {
 
     /// The bytes of an object with a measurement at `time`; `None` for any other object.
     pub(super) fn read(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Vec<u8>> {
-        let (index, shows) = *self.shown.get(&object)?;
+        let (index, content) = *self.contents.get(&object)?;
         let data_type = objects.spec(object)?.data_type;
         let channel = self.list.get_mut(index)?;
-        Some(channel.read(objects, shows, data_type, time))
+        Some(channel.read(objects, content, data_type, time))
     }
 
     /// The meaning of a mapped object, if it is a measured value.
     pub(super) fn reading(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Reading> {
-        let (index, ObjectContent::Value) = *self.shown.get(&object)? else { return None };
+        let (index, ObjectContent::Value) = *self.contents.get(&object)? else { return None };
         let channel = self.list.get(index)?;
         let integer = matches!(objects.spec(object)?.data_type, DataType::Integer(_) | DataType::Unsigned(_));
         Some(Reading {
@@ -154,13 +154,13 @@ impl Channels {
 
     /// Whether an object contains the status of a channel.
     pub(super) fn is_status(&self, object: ObjectId) -> bool {
-        self.shown.get(&object).is_some_and(|(_, shows)| *shows == ObjectContent::Status)
+        self.contents.get(&object).is_some_and(|(_, content)| *content == ObjectContent::Status)
     }
 
-    /// The measured value at `time` as the number in the object: an integer is multiplied by its power of ten. The
-    /// number is without marker and rounding.
+    /// The measured value at `time` as the number in the object, without marker and rounding. For an integer, the value
+    /// is multiplied by its power of ten.
     pub(super) fn number(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<f64> {
-        let (index, ObjectContent::Value) = *self.shown.get(&object)? else { return None };
+        let (index, ObjectContent::Value) = *self.contents.get(&object)? else { return None };
         let channel = self.list.get_mut(index)?;
         let data_type = objects.spec(object)?.data_type;
         let raw = channel.filtered(time);
@@ -182,7 +182,7 @@ impl Channels {
     }
 
     fn value_of(&self, objects: &Objects, object: ObjectId) -> Option<(&Channel, DataType)> {
-        let (index, ObjectContent::Value) = *self.shown.get(&object)? else { return None };
+        let (index, ObjectContent::Value) = *self.contents.get(&object)? else { return None };
         Some((self.list.get(index)?, objects.spec(object)?.data_type))
     }
 
@@ -217,7 +217,10 @@ impl Channels {
 
     /// Resets minimum and maximum.
     pub(super) fn reset_extremes(&mut self, number: u8) {
-        self.list.iter_mut().filter(|channel| channel.signal.channel == number).for_each(|channel| channel.seen = None);
+        self.list
+            .iter_mut()
+            .filter(|channel| channel.signal.channel == number)
+            .for_each(|channel| channel.extremes = None);
     }
 
     /// Whether an object contains the unit of a channel.
@@ -255,17 +258,17 @@ impl Channels {
     /// digits also changes its integers.
     pub(super) fn share(&self, objects: &mut Objects, written: ObjectId) {
         for channel in &self.list {
-            let is_kept = channel.follows.iter().any(|(object, _)| *object == written);
-            if let Some(value) = channel.pv(objects, written).filter(|_| is_kept) {
+            let is_in_unit = channel.objects_in_unit.iter().any(|(object, _)| *object == written);
+            if let Some(value) = channel.pv(objects, written).filter(|_| is_in_unit) {
                 channel.put_pv(objects, real_form(written), value);
             }
-            if is_kept || [channel.signal.digits, channel.signal.unit].contains(&Some(written)) {
+            if is_in_unit || [channel.signal.digits, channel.signal.unit].contains(&Some(written)) {
                 channel.align(objects, Some(written));
             }
         }
     }
 
-    /// Restarts every filter: the device has started.
+    /// Restarts every filter, because the device has started.
     pub(super) fn begin(&mut self, objects: &mut Objects, time: Duration) {
         self.list.iter().for_each(|channel| channel.align(objects, None));
         self.list.iter_mut().for_each(|channel| channel.filter.begin(objects, &channel.quantity, time));
@@ -273,7 +276,7 @@ impl Channels {
 
     /// Restarts a filter if the written object belongs to it.
     pub(super) fn refilter(&mut self, objects: &mut Objects, written: ObjectId, time: Duration) {
-        let constant = self.damp(objects, written);
+        let constant = self.apply_damping(objects, written);
         let sets = |channel: &&mut Channel| channel.filter.is_set_by(constant.unwrap_or(written));
         for channel in self.list.iter_mut().filter(sets) {
             channel.filter.begin(objects, &channel.quantity, time);
@@ -282,7 +285,7 @@ impl Channels {
 
     /// Records that a PDO with these objects was sent.
     pub(super) fn sent(&mut self, mapped: &[ObjectId]) {
-        for (index, _) in mapped.iter().filter_map(|object| self.shown.get(object)) {
+        for (index, _) in mapped.iter().filter_map(|object| self.contents.get(object)) {
             if let Some(channel) = self.list.get_mut(*index) {
                 channel.filter.sent();
             }
@@ -290,7 +293,7 @@ impl Channels {
     }
 
     /// Computes the constant of the moving average from a written damping (MH-4, 4.3.7). Returns the changed object.
-    fn damp(&self, objects: &mut Objects, object: ObjectId) -> Option<ObjectId> {
+    fn apply_damping(&self, objects: &mut Objects, object: ObjectId) -> Option<ObjectId> {
         objects.spec(object).filter(|spec| spec.name == "damping")?;
         let [kind, constant] = [0x61a0, 0x61a1].map(|index| ObjectId::new(index, object.sub));
         let channel = self.by_number(object.sub).filter(|_| objects.number(kind) == 1)?;
@@ -327,38 +330,38 @@ impl Channel {
     }
 
     /// The objects that contain a value of this channel.
-    fn shown(&self, objects: &Objects, alone: bool) -> Vec<(ObjectId, ObjectContent)> {
+    fn contents(&self, objects: &Objects, alone: bool) -> Vec<(ObjectId, ObjectContent)> {
         let sub = self.signal.channel;
-        let mut shown: Vec<(ObjectId, ObjectContent)> = Vec::new();
+        let mut contents: Vec<(ObjectId, ObjectContent)> = Vec::new();
         for family in FAMILIES {
-            shown.push((ObjectId::new(family | 0x130, sub), ObjectContent::Value));
-            shown.push((ObjectId::new(family | 0x140, sub), ObjectContent::Net));
-            shown.push((ObjectId::new(family | 0x100, sub), ObjectContent::Field));
+            contents.push((ObjectId::new(family | 0x130, sub), ObjectContent::Value));
+            contents.push((ObjectId::new(family | 0x140, sub), ObjectContent::Net));
+            contents.push((ObjectId::new(family | 0x100, sub), ObjectContent::Field));
         }
-        shown.push((self.signal.value, ObjectContent::Value));
-        shown.extend(self.signal.also.iter().map(|object| (*object, ObjectContent::Value)));
-        shown.extend(self.signal.status.map(|object| (object, ObjectContent::Status)));
+        contents.push((self.signal.value, ObjectContent::Value));
+        contents.extend(self.signal.also.iter().map(|object| (*object, ObjectContent::Value)));
+        contents.extend(self.signal.status.map(|object| (object, ObjectContent::Status)));
         // These two objects are manufacturer-specific: they have fixed names, but no fixed indices. A device with one
         // channel may have them without sub-indices.
         let mine = |object: &ObjectId| object.sub == sub || (object.sub == 0 && alone);
-        shown.extend(objects.specs().filter(|(object, _)| mine(object)).filter_map(|(object, spec)| {
+        contents.extend(objects.specs().filter(|(object, _)| mine(object)).filter_map(|(object, spec)| {
             match spec.name.as_str() {
                 "minimum-pv" => Some((object, ObjectContent::Lowest)),
                 "maximum-pv" => Some((object, ObjectContent::Highest)),
                 _ => None,
             }
         }));
-        shown.retain(|(object, _)| objects.has(*object));
-        shown
+        contents.retain(|(object, _)| objects.has(*object));
+        contents
     }
 
-    fn read(&mut self, objects: &Objects, shows: ObjectContent, data_type: DataType, time: Duration) -> Vec<u8> {
+    fn read(&mut self, objects: &Objects, content: ObjectContent, data_type: DataType, time: Duration) -> Vec<u8> {
         let raw = self.filtered(time);
-        let (low, high) = self.seen.unwrap_or((raw, raw));
+        let (low, high) = self.extremes.unwrap_or((raw, raw));
         let (low, high) = (low.min(raw), high.max(raw));
-        self.seen = Some((low, high));
+        self.extremes = Some((low, high));
         let overload = self.quantity.overload(time);
-        match shows {
+        match content {
             ObjectContent::Value if overload.is_some() && self.signal.marker => marker(data_type),
             ObjectContent::Value => self.encode(objects, data_type, raw),
             ObjectContent::Net => {
@@ -407,7 +410,7 @@ impl Channel {
         number::to_bytes(self.scaled(objects, data_type, self.value(objects, raw)), data_type)
     }
 
-    /// A value as the number in a type: an integer is multiplied by its power of ten.
+    /// Converts a value to the number in a type: for an integer, it is multiplied by its power of ten.
     fn scaled(&self, objects: &Objects, data_type: DataType, value: f64) -> f64 {
         if let Some(scale) = self.signal.scale {
             return (value - scale.offset.as_f64()) / scale.factor.as_f64();
@@ -449,13 +452,13 @@ impl Channel {
         })
     }
 
-    /// Computes the integer forms of every limit from the REAL32 form, except that of `exact`.
+    /// Computes the integer forms of every limit from the REAL32 form, except the object `exact`.
     fn align(&self, objects: &mut Objects, exact: Option<ObjectId>) {
-        for (object, _) in self.follows.iter().filter(|(object, _)| Some(*object) != exact) {
+        for (object, _) in self.objects_in_unit.iter().filter(|(object, _)| Some(*object) != exact) {
             let Some((own, real)) = self.pv(objects, *object).zip(self.pv(objects, real_form(*object))) else {
                 continue;
             };
-            // A REAL32 has fewer digits than an INTEGER32.
+            // Small differences are kept, because a REAL32 has fewer digits than an INTEGER32.
             if (own - real).abs() > real.abs() * f64::from(f32::EPSILON) {
                 self.put_pv(objects, *object, real);
             }
@@ -475,7 +478,7 @@ fn real_form(object: ObjectId) -> ObjectId {
     ObjectId::new(0x6000 | object.index & 0x0fff, object.sub)
 }
 
-/// 6150h: bit 0 invalid, bit 1 positive, bit 2 negative overload.
+/// The bits of 6150h: bit 0 invalid, bit 1 positive, bit 2 negative overload.
 pub(super) fn status(overload: Option<Direction>) -> u8 {
     match overload {
         None => 0b000,
@@ -484,7 +487,7 @@ pub(super) fn status(overload: Option<Direction>) -> u8 {
     }
 }
 
-/// The bytes that replace an invalid value (MH-4, 4.2.15): NaN, or the smallest integer.
+/// The bytes that are sent instead of an invalid value (MH-4, 4.2.15): NaN, or the smallest integer.
 fn marker(data_type: DataType) -> Vec<u8> {
     match data_type {
         DataType::Integer(_) => number::to_bytes(f64::NEG_INFINITY, data_type),

@@ -126,9 +126,9 @@ impl SimData {
     /// Quantities in the middle of the measuring ranges in the description, else between 0 and 100.
     fn generic(model: &Model) -> SimData {
         // A value with a default is constant: the simulator returns the default.
-        let moves =
+        let is_changing =
             |signal: &&SignalEntry| model.dictionary.get(signal.value).is_some_and(|entry| entry.default.is_none());
-        let channels = model.description.signals.iter().filter(moves).map(|signal| {
+        let channels = model.description.signals.iter().filter(is_changing).map(|signal| {
             let end = |object: Option<ObjectId>| number(model, object?, signal.digits);
             let range = end(signal.span_start).zip(end(signal.span_end)).filter(|(start, end)| start < end);
             let (start, end) = range.unwrap_or((0.0, 100.0));

@@ -13,7 +13,7 @@ const MAX_OPERATORS: usize = 100;
 /// The largest nesting depth of parentheses, signs and `not`.
 const MAX_DEPTH: usize = 50;
 
-/// Units that are suggested for an unknown one.
+/// Units in the hint for an unknown unit.
 const COMMON_UNITS: &str = "bar, mbar, kPa, MPa, psi, degC, degF, K, mV, mA, Hz, ms";
 
 const RELATIONS: [Relation; 6] =
@@ -98,15 +98,15 @@ impl Parser {
         self.tokens.get(self.next).map_or(self.end, |&(_, at)| at)
     }
 
-    /// Skips the next token if it is `sign`.
+    /// Skips the next token if it is `sign`. Returns whether it was skipped.
     fn skip(&mut self, sign: &str) -> bool {
-        let is = match self.peek() {
-            Some(Token::Sign(there)) => *there == sign,
-            Some(Token::Word(there)) => there == sign,
+        let is_skipped = match self.peek() {
+            Some(Token::Sign(next)) => *next == sign,
+            Some(Token::Word(next)) => next == sign,
             _ => false,
         };
-        self.next += usize::from(is);
-        is
+        self.next += usize::from(is_skipped);
+        is_skipped
     }
 
     /// Skips the next token, which must be `sign`.
@@ -181,28 +181,28 @@ impl Parser {
             self.expect("..").map_err(|error| error.hint("write \"..\" between the ends of the range: 9.95..10.05"))?;
             let high = self.sum()?.quantity()?;
             let (mut low, mut high) = share_unit(low, high)?;
-            self.name_object(&mut [&mut value, &mut low, &mut high]);
+            self.convert_index(&mut [&mut value, &mut low, &mut high]);
             return Ok(Parsed::Condition(Condition::Within(value, low, high, at), start));
         }
         for relation in RELATIONS {
             if self.skip(relation.as_str()) {
                 let mut left = left.quantity()?;
                 let mut right = self.sum()?.quantity()?;
-                self.name_object(&mut [&mut left, &mut right]);
+                self.convert_index(&mut [&mut left, &mut right]);
                 return Ok(Parsed::Condition(Condition::Compare(left, relation, right, at), start));
             }
         }
         Ok(left)
     }
 
-    /// If these parts of a comparison contain no signal, the first index in them is an object with sub-index 0.
-    fn name_object(&self, parts: &mut [&mut Quantity]) {
+    /// Converts the first index to an object with sub-index 0, if these parts of a comparison contain no signal.
+    fn convert_index(&self, parts: &mut [&mut Quantity]) {
         if parts.iter().all(|part| part.is_constant()) {
-            parts.iter_mut().any(|part| self.name_first_object(part));
+            parts.iter_mut().any(|part| self.convert_first_index(part));
         }
     }
 
-    fn name_first_object(&self, part: &mut Quantity) -> bool {
+    fn convert_first_index(&self, part: &mut Quantity) -> bool {
         match part {
             Quantity::Number(_, None, at) => {
                 let token = self.tokens.iter().find(|(_, position)| position.0 == at.0);
@@ -213,9 +213,11 @@ impl Parser {
             }
             Quantity::Number(..) | Quantity::Signal(_) => false,
             Quantity::Negative(inner, _) | Quantity::Absolute(inner, _) | Quantity::Aggregate(_, inner, _) => {
-                self.name_first_object(inner)
+                self.convert_first_index(inner)
             }
-            Quantity::Arithmetic(left, _, right, _) => self.name_first_object(left) || self.name_first_object(right),
+            Quantity::Arithmetic(left, _, right, _) => {
+                self.convert_first_index(left) || self.convert_first_index(right)
+            }
         }
     }
 
@@ -298,7 +300,7 @@ impl Parser {
         };
         let mut inner = self.nested(Parser::sum)?.quantity()?;
         self.expect(")")?;
-        self.name_object(&mut [&mut inner]);
+        self.convert_index(&mut [&mut inner]);
         Ok(Parsed::Quantity(Quantity::Aggregate(function, Box::new(inner), at)))
     }
 
@@ -321,7 +323,7 @@ impl Parser {
         Ok(Some(self.divided_unit(&word).unwrap_or(unit)))
     }
 
-    /// The unit with a denominator, such as `l/h`, if a denominator follows and the unit exists.
+    /// Parses a denominator after the unit, such as `l/h`, if there is one and the unit exists.
     fn divided_unit(&mut self, numerator: &str) -> Option<Unit> {
         let [Token::Sign("/"), Token::Word(denominator)] = [0, 1]
             .map(|at| self.tokens.get(self.next + at).map(|(token, _)| token.clone()))
@@ -335,7 +337,7 @@ impl Parser {
     }
 }
 
-/// In `9.95..10.05 bar` both ends have the unit bar. A reversed range is rejected.
+/// Gives both ends of a range the same unit: in `9.95..10.05 bar` both are in bar. Rejects a reversed range.
 fn share_unit(mut low: Quantity, mut high: Quantity) -> Result<(Quantity, Quantity), LocatedError> {
     let at = high.at();
     if let (Some((first, low)), Some((second, high))) = (literal(&mut low), literal(&mut high)) {
@@ -350,7 +352,7 @@ fn share_unit(mut low: Quantity, mut high: Quantity) -> Result<(Quantity, Quanti
     Ok((low, high))
 }
 
-/// The value and the unit of a number, with its sign.
+/// Returns the value of a number, with its sign, and its unit.
 fn literal(quantity: &mut Quantity) -> Option<(f64, &mut Option<Unit>)> {
     match quantity {
         Quantity::Number(number, unit, _) => Some((*number, unit)),

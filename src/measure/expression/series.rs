@@ -17,7 +17,7 @@ struct Series {
     statistics: Statistics,
 }
 
-/// A signal of expressions.
+/// A signal that expressions use.
 #[derive(Clone, Debug)]
 pub(super) struct SharedSignal {
     /// The node.
@@ -27,8 +27,8 @@ pub(super) struct SharedSignal {
     /// The unit of its values, if known.
     pub(super) unit: Option<Unit>,
     series: Vec<Series>,
-    /// Whether a sample was received. Expressions that are bound later have fewer samples, so they share nothing with
-    /// earlier ones.
+    /// Whether a sample was received. Expressions that are bound later have fewer samples, so they do not share this
+    /// signal.
     has_samples: bool,
 }
 
@@ -44,12 +44,12 @@ pub(super) struct SeriesId {
 pub(super) struct SharedSignals(Vec<SharedSignal>);
 
 impl SharedSignals {
-    /// The place of a signal, for an expression that is bound now.
+    /// Returns the place of a signal for a new expression, and adds the signal if necessary.
     pub(super) fn signal(&mut self, wanted: &Input) -> usize {
-        let is_it = |known: &SharedSignal| {
+        let can_share = |known: &SharedSignal| {
             !known.has_samples && (known.node, &known.name, known.unit) == (wanted.node, &wanted.name, wanted.unit)
         };
-        if let Some(at) = self.0.iter().position(is_it) {
+        if let Some(at) = self.0.iter().position(can_share) {
             return at;
         }
         let Input { node, name, unit, .. } = wanted.clone();
@@ -57,7 +57,7 @@ impl SharedSignals {
         self.0.len() - 1
     }
 
-    /// The place of the statistics of a formula whose only input is this signal.
+    /// Returns the place of the statistics of a formula whose only input is this signal.
     pub(super) fn series(&mut self, signal: usize, formula: &Formula) -> SeriesId {
         let formula = formula.of_first_input();
         let all = &mut self.0[signal].series;

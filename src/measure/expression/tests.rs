@@ -107,7 +107,7 @@ fn errors_have_a_position() {
 
 fn signal() -> impl Strategy<Value = Quantity> {
     let what = prop_oneof![
-        // No unit: "bar / a" has the unit bar per year.
+        // The names are not units: "bar / a" would be read as bar per year.
         "x[abc]{0,2}(-[a-z])?".prop_map(Wanted::Signal),
         "z[a-z]{0,3}".prop_map(Wanted::Status),
         (any::<u16>(), any::<u8>()).prop_map(|(index, sub)| Wanted::Object(ObjectId::new(index, sub), None)),

@@ -3,7 +3,7 @@
 use super::LocatedError;
 use super::tree::{Condition, Position, Quantity};
 
-/// The moment from which the value of a quantity is known.
+/// When the value of a quantity is known.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Availability {
     /// Always, because it is a constant.

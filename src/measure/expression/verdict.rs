@@ -136,7 +136,7 @@ pub struct LiveResult {
     pub text: String,
     /// The node of all signals that have no node in the expression.
     pub node: Option<NodeId>,
-    /// All samples until now satisfy the expression. `None` before the first decision.
+    /// Whether all samples until now satisfy the expression. `None` before the first decision.
     pub is_satisfied: Option<bool>,
     /// The latest values.
     pub values: Vec<QuantityValue>,

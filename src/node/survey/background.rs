@@ -39,14 +39,14 @@ impl From<Error> for Stop {
     }
 }
 
-/// The answers received so far.
-struct Known<'a, 'bus> {
+/// Reads objects from the answers received so far.
+struct KnownAnswers<'a, 'bus> {
     answers: &'a BTreeMap<ObjectId, Result<Answer, SdoError>>,
     unknown: &'a mut BTreeSet<ObjectId>,
     master: &'a mut Master<'bus>,
 }
 
-impl ObjectReader for Known<'_, '_> {
+impl ObjectReader for KnownAnswers<'_, '_> {
     type Stop = Stop;
 
     fn read_objects(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Stop> {
@@ -127,7 +127,7 @@ impl BackgroundSurvey {
     }
 
     fn run(&mut self, master: &mut Master<'_>) -> Option<Result<Node, Error>> {
-        let mut known = Known { answers: &self.answers, unknown: &mut self.unknown, master };
+        let mut known = KnownAnswers { answers: &self.answers, unknown: &mut self.unknown, master };
         match survey_nodes(&mut known, &[self.node], &self.overrides) {
             Ok(mut read) => match self.no_longer_answered(master) {
                 Some(error) => Some(Err(Error::Sdo(error))),
@@ -143,7 +143,8 @@ impl BackgroundSurvey {
         }
     }
 
-    /// The error of an object that was answered before. If there is none, the unknown objects are recorded.
+    /// Returns the error of an object that was answered before, but not now. If there is none, records the unknown
+    /// objects.
     fn no_longer_answered(&self, master: &mut Master<'_>) -> Option<SdoError> {
         let before = master.unknown_objects().remove(&self.node).unwrap_or_default();
         let error = |object| self.answers.get(object).and_then(|answer| answer.as_ref().err()).cloned();

@@ -9,8 +9,8 @@ use crate::measure::sample::Number;
 use crate::node::Node;
 use crate::node::read::{Item, Reader};
 
-/// Reads the measuring ranges (6148h, 6149h) if a value depends on them. This is an integer of at most 24 bits, or a
-/// described signal without a status. A device with integers may have these objects as integers only (7148h to 9149h).
+/// Reads the measuring ranges (6148h, 6149h) if a value depends on them: an integer of at most 24 bits, or a described
+/// signal without a status. A device with integers may have these objects as integers only (7148h to 9149h).
 pub(super) fn read_ranges<A: ObjectReader>(reader: &mut Reader<'_, A>, nodes: &mut [Node]) -> Result<(), A::Stop> {
     read_family(reader, nodes, 0x6000, |_| true)?;
     for family in [0x9000, 0x8000, 0x7000] {
@@ -21,19 +21,19 @@ pub(super) fn read_ranges<A: ObjectReader>(reader: &mut Reader<'_, A>, nodes: &m
     Ok(())
 }
 
-/// Reads the measuring ranges of some signals from the objects of a family (6xxxh to 9xxxh).
+/// Reads the measuring ranges of the selected signals from the objects of a family (6xxxh to 9xxxh).
 fn read_family<A: ObjectReader>(
     reader: &mut Reader<'_, A>,
     nodes: &mut [Node],
     family: u16,
-    is_meant: impl Fn(&Signal) -> bool,
+    is_selected: impl Fn(&Signal) -> bool,
 ) -> Result<(), A::Stop> {
     // Node, signal, and its two ends.
     type Range = (usize, usize, [(ObjectId, DataType); 2]);
     let mut wanted: Vec<Range> = Vec::new();
     for (at, node) in nodes.iter().enumerate() {
         for (number, signal) in node.signals.iter().enumerate() {
-            if signal.rules.scaling != Scaling::Digits || !is_meant(signal) || !needs_range(node, signal) {
+            if signal.rules.scaling != Scaling::Digits || !is_selected(signal) || !needs_range(node, signal) {
                 continue;
             }
             let entries = node.model.iter().flat_map(|model| &model.description.signals);
@@ -89,7 +89,7 @@ fn is_narrow(data_type: Option<DataType>) -> bool {
     matches!(data_type, Some(DataType::Integer(1..=3)))
 }
 
-/// The signals whose values the valid TPDOs of a node may clip. Their measuring ranges are read before.
+/// Finds the signals whose values may be clipped in the valid TPDOs of a node. Reads their measuring ranges first.
 ///
 /// # Errors
 /// A node that does not answer; bus errors and Ctrl-C.

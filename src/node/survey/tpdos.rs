@@ -6,7 +6,7 @@ use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use crate::node::read::{Item, Reader};
 
-/// The number of TPDOs read from a device without a description. The temperature probe of JUMO sends TPDO5.
+/// The number of TPDOs read from a device without a description. Four are not enough: a JUMO probe sends TPDO5.
 const UNDESCRIBED_TPDOS: u16 = 8;
 
 /// The TPDOs that the description lists. Without a description, or if it lists none, the first TPDOs.

@@ -17,9 +17,9 @@ pub(super) struct Block {
     has_crc: bool,
     /// Whether the master computes a CRC.
     offers_crc: bool,
-    /// The segments of the present block that came in order.
+    /// The segments of the present block that were received in order.
     segments: Vec<[u8; 7]>,
-    /// Whether the last one of them is the last segment of the transfer.
+    /// Whether the last element of `segments` is the last segment of the transfer.
     has_last: bool,
     has_wrong_end: bool,
 }
@@ -35,7 +35,7 @@ enum Phase {
 }
 
 impl Block {
-    /// A transfer that a request starts.
+    /// Creates the transfer that a request starts.
     pub(super) fn new(operation: Operation, data: &[u8]) -> Block {
         let command = data.first().copied().unwrap_or_default();
         let mut block = Block {
@@ -120,7 +120,7 @@ impl Block {
         if sequence == 0 {
             return Step::Stray;
         }
-        // The receiver requests segments after a gap again.
+        // After a gap, the receiver requests the segments again.
         if sequence == self.segments.len() + 1 && !self.has_last {
             let mut segment = [0; 7];
             let part = frame.data().get(1..).unwrap_or_default();
@@ -132,13 +132,13 @@ impl Block {
     }
 
     fn on_acknowledge(&mut self, frame: &Frame) -> Step {
-        let taken = frame.data().get(1).copied().map(usize::from);
-        let Some(taken) = taken.filter(|&taken| taken <= self.segments.len()) else {
-            // A segment of the transfer was not received here.
+        let acknowledged = frame.data().get(1).copied().map(usize::from);
+        let Some(acknowledged) = acknowledged.filter(|&acknowledged| acknowledged <= self.segments.len()) else {
+            // A segment of the transfer was lost on the way to this program.
             return Step::End(Outcome::Violation(Violation::Sequence, *frame));
         };
-        let is_complete = self.has_last && taken == self.segments.len();
-        self.bytes.extend(self.segments[..taken].iter().flatten());
+        let is_complete = self.has_last && acknowledged == self.segments.len();
+        self.bytes.extend(self.segments[..acknowledged].iter().flatten());
         self.segments.clear();
         self.has_last = false;
         if self.bytes.len() > LONGEST + 6 {

@@ -30,7 +30,7 @@ enum State {
     Block(Block),
 }
 
-/// The result of a frame.
+/// What a frame means for a transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Step {
     /// The frame does not belong to the transfer.
@@ -42,7 +42,7 @@ pub(super) enum Step {
 }
 
 impl Open {
-    /// The transfer that a request starts. With `accept_60`, the node answers reads with 60h.
+    /// Creates the transfer that a request starts. With `accept_60`, the node answers reads with 60h.
     pub(super) fn new(node: NodeId, object: ObjectId, accept_60: bool, received: &Received) -> Open {
         let data = received.frame.data();
         let command = data.first().copied().unwrap_or_default();
@@ -56,7 +56,7 @@ impl Open {
         Open { node, object, operation, requested: at, answered: None, last: at, is_disturbed: false, state }
     }
 
-    /// When the transfer ends if no frame comes.
+    /// The time at which the transfer ends without a further frame.
     pub(super) fn deadline(&self) -> Mono {
         self.last.mono + if self.operation == Operation::Read { READ_TIMEOUT } else { WRITE_TIMEOUT }
     }
@@ -104,7 +104,7 @@ impl Open {
         step
     }
 
-    /// The transfer after its end. `at` is the time of the frame that ended it.
+    /// Returns the transfer after its end. `at` is the time of the frame that ended it.
     pub(super) fn finished(self, at: Option<Stamp>, outcome: Outcome) -> Transfer {
         let form = match &self.state {
             State::Block(_) => Form::Block,
@@ -127,7 +127,7 @@ impl Open {
 }
 
 fn upload_step(upload: &mut Upload, frame: &Frame) -> Step {
-    // The master sends the requests for segments, so those of this state machine are not sent.
+    // The other master requests the segments, so the requests of this state machine are dropped.
     match upload.on_frame(frame, &mut Vec::new()) {
         Progress::NotOurs => Step::Stray,
         Progress::Continue => Step::Continue,
@@ -138,7 +138,7 @@ fn upload_step(upload: &mut Upload, frame: &Frame) -> Step {
     }
 }
 
-/// A request for a segment.
+/// Handles a request for a segment.
 fn upload_request(upload: &Upload, frame: &Frame) -> Step {
     let is_segment = frame.data().first().is_some_and(|command| command >> 5 == 3);
     if upload.has_begun() && is_segment { Step::Continue } else { Step::Stray }
@@ -152,7 +152,7 @@ struct Download {
     /// Whether the node acknowledged the request, and segments follow.
     has_begun: bool,
     toggle: bool,
-    /// Whether a segment waits for its acknowledgement, and whether it is the last one.
+    /// `Some` if a segment waits for its acknowledgement; the value is `true` for the last segment.
     segment: Option<bool>,
 }
 

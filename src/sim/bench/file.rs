@@ -192,7 +192,7 @@ impl DeviceEntry {
     }
 
     /// Whether the device is connected only for a part of the time.
-    pub(super) fn is_plugged(&self) -> bool {
+    pub(super) fn is_partly_connected(&self) -> bool {
         self.connected.is_some()
     }
 
@@ -204,10 +204,10 @@ impl DeviceEntry {
         }
     }
 
-    /// `before` is the number of previous devices of this kind. It is added to the serial number, so that each device
-    /// has its own.
-    pub(super) fn setup(&self, seed: u64, before: u32, beside: &Path) -> Result<Setup, BenchError> {
-        let mut setup = Setup::new(self.model(beside)?, self.node.unwrap_or(NodeId::MIN));
+    /// Converts the entry to a setup. `before` is the number of previous devices of this kind. It is added to the
+    /// serial number, so that each device has another one.
+    pub(super) fn setup(&self, seed: u64, before: u32, folder: &Path) -> Result<Setup, BenchError> {
+        let mut setup = Setup::new(self.model(folder)?, self.node.unwrap_or(NodeId::MIN));
         setup.node = self.node;
         let named = |error| BenchError::Usage(format!("{}: {error}", self.name()));
         setup.bit_rate = self.bit_rate.map(check_rate).transpose().map_err(named)?;
@@ -226,10 +226,10 @@ impl DeviceEntry {
         setup.set = self.set.iter().map(|(object, value)| (*object, value.clone())).collect();
         setup.seed = seed;
         for changed in &self.channel {
-            changed.apply(self.find(&mut setup.channels, changed.channel)?, beside)?;
+            changed.apply(self.find(&mut setup.channels, changed.channel)?, folder)?;
         }
         for text in &self.constant {
-            self.hold(&mut setup, text).ok_or_else(|| {
+            self.set_constant(&mut setup, text).ok_or_else(|| {
                 let signals: Vec<&str> = setup.model.description.signals.iter().map(|it| it.name.as_str()).collect();
                 let message = format!("\"{text}\" is not SIGNAL=VALUE with a unit of the signal");
                 BenchError::Usage(format!("{}: {message} ({})", self.name(), signals.join(", ")))
@@ -251,7 +251,7 @@ impl DeviceEntry {
     }
 
     /// Sets a signal to a constant value: `pressure=0bar`. Without a unit, the unit of the simulator is used.
-    fn hold(&self, setup: &mut Setup, text: &str) -> Option<()> {
+    fn set_constant(&self, setup: &mut Setup, text: &str) -> Option<()> {
         let (name, value) = text.split_once('=')?;
         let signal = setup.model.description.signals.iter().find(|signal| signal.name == name)?;
         let channel = setup.channels.iter_mut().find(|channel| channel.channel == signal.channel)?;
@@ -266,15 +266,16 @@ impl DeviceEntry {
             .ok_or_else(|| BenchError::Usage(format!("{} has no channel {number}", self.name())))
     }
 
-    fn model(&self, beside: &Path) -> Result<Arc<Model>, BenchError> {
-        let is_a = |kind: &str| Path::new(&self.kind).extension().is_some_and(|it| it.eq_ignore_ascii_case(kind));
-        let path = beside.join(&self.kind);
-        if is_a("eds") || is_a("dcf") {
+    fn model(&self, folder: &Path) -> Result<Arc<Model>, BenchError> {
+        let has_extension =
+            |kind: &str| Path::new(&self.kind).extension().is_some_and(|it| it.eq_ignore_ascii_case(kind));
+        let path = folder.join(&self.kind);
+        if has_extension("eds") || has_extension("dcf") {
             let bytes = std::fs::read(&path).map_err(|source| BenchError::Io { path: path.clone(), source })?;
             let eds = eds::read(&bytes).map_err(|error| BenchError::Usage(format!("{}: {error}", path.display())))?;
             return Ok(Arc::new(Model::from_eds(&eds)));
         }
-        if is_a("toml") {
+        if has_extension("toml") {
             let model = Model::from_toml(&read(&path)?);
             return model.map(Arc::new).map_err(|error| BenchError::Usage(error.in_file(&path.display().to_string())));
         }
@@ -285,7 +286,7 @@ impl DeviceEntry {
     }
 }
 
-/// A value in the unit `own`: `5.2bar`, or a number in that unit.
+/// Parses a value and converts it to the unit `own`: `5.2bar`, or a number in this unit.
 pub(in crate::sim) fn value_in(text: &str, own: Unit) -> Option<f64> {
     let (number, unit) =
         text.split_at(text.find(|letter: char| !"+-.0123456789".contains(letter)).unwrap_or(text.len()));
@@ -293,7 +294,7 @@ pub(in crate::sim) fn value_in(text: &str, own: Unit) -> Option<f64> {
     unit.convert(number.parse().ok()?, own)
 }
 
-/// The points of a CSV file: seconds, value. A first line that is not a number is a heading.
+/// Reads the points of a CSV file: seconds, value. A first line that is not a number is a heading.
 fn points(path: &Path) -> Result<Form, BenchError> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (index, line) in read(path)?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
@@ -319,9 +320,9 @@ fn points(path: &Path) -> Result<Form, BenchError> {
 }
 
 impl ChannelEntry {
-    fn apply(&self, channel: &mut SimChannel, beside: &Path) -> Result<(), BenchError> {
+    fn apply(&self, channel: &mut SimChannel, folder: &Path) -> Result<(), BenchError> {
         channel.form = match (&self.csv, self.form) {
-            (Some(path), _) => points(&beside.join(path))?,
+            (Some(path), _) => points(&folder.join(path))?,
             (None, Some(FormName::Ramp)) => Form::Ramp,
             (None, Some(FormName::Sine) | None) => Form::Sine,
         };

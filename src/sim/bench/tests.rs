@@ -83,7 +83,7 @@ fn mistakes_in_a_file_have_their_line() {
     assert!(text(&format!("{device}{}", overload.replace("2s", "2 parsecs"))).starts_with("6:8: "));
 }
 
-/// Frames up to `until`.
+/// Receives the frames up to `until`.
 fn hear(bus: &mut MemoryBus, until: Duration) -> Vec<String> {
     let mut texts = Vec::new();
     while let Ok(Event::Frame(received)) = bus.receive(Mono::at(until)) {

@@ -1,4 +1,4 @@
-//! Values of a bench file that are types of other layers.
+//! Reads values of a bench file as types of other layers.
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
