@@ -116,7 +116,7 @@ impl Channels {
         Channels { list, contents }
     }
 
-    /// Holds a signal at a value: `pressure`, `5.2bar`.
+    /// Sets a signal to a constant value: `pressure`, `5.2bar`.
     pub(super) fn hold(&mut self, signal: &str, value: &str) -> Result<(), String> {
         let names: Vec<&str> = self.list.iter().map(|channel| channel.signal.name.as_str()).collect();
         let Some(place) = names.iter().position(|name| *name == signal) else {

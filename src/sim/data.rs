@@ -106,7 +106,7 @@ pub struct SimChannel {
 }
 
 impl SimChannel {
-    /// Holds the quantity at a value.
+    /// Sets the quantity to a constant value.
     pub fn hold(&mut self, value: f64) {
         (self.base, self.amplitude, self.noise, self.form) = (value, 0.0, 0.0, Form::Sine);
     }

@@ -68,7 +68,7 @@ pub struct Device {
     heartbeat: Option<Mono>,
     /// Toggle bit of the next guarding answer.
     toggle: bool,
-    /// The last guarding request. The first one starts life guarding.
+    /// The time of the last guarding request. The first request starts life guarding.
     guarded: Option<Mono>,
     /// The next time at which an overload may begin or end.
     next_overload_change: Option<Mono>,
@@ -76,12 +76,12 @@ pub struct Device {
     overloaded: BTreeMap<u8, Direction>,
     /// Answers that are not due yet.
     delayed: VecDeque<(Mono, Frame)>,
-    /// When it is plugged in and unplugged next.
+    /// The times at which the device is plugged in or unplugged next.
     connections: VecDeque<Mono>,
     is_connected: bool,
     recorder: Option<Recorder>,
     remembered: Option<console::Remembered>,
-    /// Whether it neither receives nor sends, as the user asked.
+    /// Whether the user silenced the device: it neither receives nor sends.
     is_silent: bool,
     /// TPDOs that wait for the bus, with their lines for the record.
     in_transit: VecDeque<(Frame, Vec<Line>)>,
@@ -141,7 +141,7 @@ impl Device {
         })
     }
 
-    /// The same device with a recorder for the sent values.
+    /// Adds a recorder for the sent values.
     pub fn recording(mut self, recorder: Recorder) -> Device {
         self.recorder = Some(recorder);
         self
@@ -152,7 +152,7 @@ impl Device {
         self.memory.settings.active.node
     }
 
-    /// Its present bit rate in bit/s; `None` if it follows the bus.
+    /// Its present bit rate in bit/s; `None` if it uses the bit rate of the bus.
     pub fn bit_rate(&self) -> Option<u32> {
         fixed(self.memory.settings.active.rate)
     }
@@ -198,7 +198,7 @@ impl Device {
         let number = |object| self.memory.objects.number(object);
         let autonomous = match &self.setup.model.description.startup {
             Some(startup) => number(startup.object) == startup.auto,
-            // CiA 302-2: bit 3 set and bit 2 clear.
+            // CiA 302-2: the device starts by itself if bit 3 is set and bit 2 is clear.
             None => number(NMT_STARTUP) & 0b1100 == 0b1000,
         };
         let starts = self.setup.start || autonomous;
@@ -259,7 +259,7 @@ impl Device {
         self.memory.emergencies.drop_waiting();
     }
 
-    /// Loads the stored values, under the node-ID that is now active.
+    /// Loads the stored values, with the node-ID that is now active.
     fn restart(&mut self, area: Area) {
         let Memory { node, settings, objects, .. } = &mut self.memory;
         let before = std::mem::replace(node, settings.active.node.unwrap_or(NodeId::MIN));
@@ -301,7 +301,7 @@ impl Device {
         self.send_emergencies(now, out);
     }
 
-    /// When life guarding fails: after guard time × life time factor without a request.
+    /// The time at which life guarding fails: guard time × life time factor after the last request.
     fn life_end(&self) -> Option<Mono> {
         let guarded = self.guarded.filter(|_| self.heartbeat.is_none())?;
         let objects = &self.memory.objects;
@@ -309,7 +309,7 @@ impl Device {
         (life_time > 0).then(|| guarded + Duration::from_millis(life_time.into()))
     }
 
-    /// If guarding stops, the device leaves OPERATIONAL (CiA 301, 1029h). The next request starts life guarding again.
+    /// Ends life guarding without requests: OPERATIONAL is left (CiA 301, 1029h). The next request restarts guarding.
     fn end_guarding(&mut self, now: Mono) {
         self.guarded = None;
         if self.memory.emergencies.knows(GUARDING_FAILED) {

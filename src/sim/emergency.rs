@@ -24,15 +24,15 @@ pub(super) struct Emergencies {
     /// Pending codes with their channels; channel 0 is the device itself.
     pending: BTreeMap<u16, BTreeSet<u8>>,
     history: VecDeque<u32>,
-    /// The number of errors in 1003h:0, for a device without further entries of 1003h.
+    /// The number of errors in 1003h:0, for a device without the entries 1003h:1 to 254.
     count: u8,
     waiting: VecDeque<[u8; 8]>,
     /// End of the inhibit time.
-    free: Mono,
+    inhibited_until: Mono,
     /// Whether the device has [`Quirk::EmergencyRepeats`].
     repeats: bool,
-    /// The message that is repeated while an error is pending, and its next time.
-    again: Option<([u8; 8], Mono)>,
+    /// The message that is repeated while an error is pending, and the time of its next repetition.
+    next_repeat: Option<([u8; 8], Mono)>,
 }
 
 impl Emergencies {
@@ -57,7 +57,7 @@ impl Emergencies {
         let described = self.described.iter().find(|entry| entry.code == code);
         let mut extra = [0; 5];
         for (byte, meaning) in extra.iter_mut().zip(described.map_or(&[][..], |entry| &entry.bytes)) {
-            *byte = meaning_of(meaning, channel, status);
+            *byte = byte_value(meaning, channel, status);
         }
         let entries = self.capacity(objects);
         if entries > 0 {
@@ -102,7 +102,7 @@ impl Emergencies {
     /// Resets everything, as at power-on.
     pub(super) fn forget(&mut self) {
         self.pending.clear();
-        self.again = None;
+        self.next_repeat = None;
         self.history.clear();
         self.count = 0;
         self.waiting.clear();
@@ -151,33 +151,33 @@ impl Emergencies {
 
     /// Queues the repeated emergency of a pending error when it is due.
     pub(super) fn repeat(&mut self, objects: &Objects, now: Mono) {
-        let Some((message, due)) = self.again else { return };
+        let Some((message, due)) = self.next_repeat else { return };
         if self.pending.is_empty() {
-            self.again = None;
+            self.next_repeat = None;
         } else if due <= now {
             self.waiting.push_back(message);
-            self.again = repeat_time(objects).map(|period| (message, next_due(due, period, now)));
+            self.next_repeat = repeat_time(objects).map(|period| (message, next_due(due, period, now)));
         }
     }
 
     /// The next message, if there is one and the inhibit time has passed.
     pub(super) fn next_frame(&mut self, objects: &Objects, node: NodeId, now: Mono) -> Option<Frame> {
-        if now < self.free {
+        if now < self.inhibited_until {
             return None;
         }
         let message = self.waiting.pop_front()?;
-        if self.repeats && self.again.is_none() && !self.pending.is_empty() {
-            self.again = repeat_time(objects).map(|period| (message, now + period));
+        if self.repeats && self.next_repeat.is_none() && !self.pending.is_empty() {
+            self.next_repeat = repeat_time(objects).map(|period| (message, now + period));
         }
-        self.free = now + Duration::from_micros(100) * objects.number(INHIBIT_TIME);
+        self.inhibited_until = now + Duration::from_micros(100) * objects.number(INHIBIT_TIME);
         Some(Frame::full(cob_id(objects, node)?, message))
     }
 
     /// The time of the next message of [`Emergencies::next_frame`].
     pub(super) fn next_wake(&self) -> Option<Mono> {
-        let waiting = self.waiting.front().map(|_| self.free);
-        let again = self.again.map(|(_, due)| due);
-        waiting.into_iter().chain(again).min()
+        let waiting = self.waiting.front().map(|_| self.inhibited_until);
+        let next_repeat = self.next_repeat.map(|(_, due)| due);
+        waiting.into_iter().chain(next_repeat).min()
     }
 }
 
@@ -197,8 +197,8 @@ fn cob_id(objects: &Objects, node: NodeId) -> Option<CanId> {
     if cob_id & 0x8000_0000 == 0 { CanId::standard(id) } else { None }
 }
 
-/// The number in a byte of the message, from its meaning: "1 (channel)", "AI status 6150h", "0".
-fn meaning_of(meaning: &str, channel: u8, status: u8) -> u8 {
+/// Returns the value of a message byte from its meaning in the manual: "1 (channel)", "AI status 6150h", "0".
+fn byte_value(meaning: &str, channel: u8, status: u8) -> u8 {
     let meaning = meaning.to_ascii_lowercase();
     if meaning.contains("channel") {
         channel

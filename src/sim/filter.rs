@@ -35,7 +35,7 @@ pub(super) struct Filter {
     /// The meanings of the codes of 61A0h.
     kinds: BTreeMap<u32, Kind>,
     kind: Kind,
-    /// N, at least 1.
+    /// N, the filter constant (61A1h), at least 1.
     constant: u64,
     /// The number of the next sample.
     next: u64,
@@ -50,7 +50,7 @@ pub(super) struct Filter {
 }
 
 impl Filter {
-    /// The filter of a channel from the device's description; none without 61A0h.
+    /// Creates the filter of a channel from the description. Without 61A0h, the channel has no filter.
     pub(super) fn new(description: &Description, channel: u8, until_pdo: bool) -> Filter {
         let codes = description.object(ObjectId::new(TYPE, channel)).map(|entry| &entry.values);
         let kinds = codes.into_iter().flatten().filter_map(|(code, meaning)| {
@@ -106,7 +106,7 @@ impl Filter {
                 self.is_new = true;
                 self.value = input;
             } else {
-                self.take(input, longest);
+                self.add_sample(input, longest);
             }
         }
         self.value
@@ -132,7 +132,7 @@ impl Filter {
         }
     }
 
-    fn take(&mut self, input: f64, longest: u64) {
+    fn add_sample(&mut self, input: f64, longest: u64) {
         if self.is_new {
             (self.is_new, self.is_full) = (false, false);
             (self.sum, self.count) = (0.0, 0);
@@ -165,8 +165,8 @@ impl Filter {
     }
 }
 
-/// The constant of a moving average that is within 1 % of the final value of a step after `damping`. MH-4, 4.3.7 gives
-/// this meaning of 2023h, but not its formula.
+/// The constant of a moving average for a damping time: after this time, the value is within 1 % of a step. MH-4, 4.3.7
+/// gives this meaning of 2023h, but not its formula.
 pub(super) fn constant_for(damping: Duration, sample_us: u128) -> u16 {
     let steps = damping.as_micros() as f64 / sample_us as f64;
     // (1 - 1/N)^steps = 0.01
@@ -190,11 +190,11 @@ mod tests {
         Filter { kind, constant, ..Filter::new(&mh4.description, 1, false) }
     }
 
-    /// The values after each of the samples.
+    /// Returns the filtered value after each sample.
     fn shown(filter: &mut Filter, inputs: &[f64], longest: u64) -> Vec<f64> {
         let mut shown = Vec::new();
         for input in inputs {
-            filter.take(*input, longest);
+            filter.add_sample(*input, longest);
             shown.push(filter.value);
         }
         shown

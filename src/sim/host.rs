@@ -28,10 +28,10 @@ pub fn run(
     until: Option<Mono>,
     mut console: Option<Console<'_>>,
 ) -> Result<Vec<Box<dyn Station>>, BusError> {
-    let places = stations.into_iter().map(|station| (station, Outbox::default())).collect();
-    let mut host = Host { places, bit_rate: bus.bit_rate() };
+    let hosted = stations.into_iter().map(|station| (station, Outbox::default())).collect();
+    let mut host = Host { hosted, bit_rate: bus.bit_rate() };
     let now = bus.now().mono;
-    for (station, out) in &mut host.places {
+    for (station, out) in &mut host.hosted {
         host.bit_rate.into_iter().for_each(|bit_rate| station.on_bus_bit_rate(bit_rate));
         station.power_on(now, out);
     }
@@ -51,7 +51,7 @@ pub fn run(
             Event::Timeout | Event::Fault(..) | Event::Dropped(_) | Event::Link(false) => {}
         }
     }
-    Ok(host.places.into_iter().map(|(station, _)| station).collect())
+    Ok(host.hosted.into_iter().map(|(station, _)| station).collect())
 }
 
 /// The commands of a user while the simulation runs. Each line comes with an interrupt, which ends a wait.
@@ -63,17 +63,17 @@ pub struct Console<'a> {
 }
 
 struct Host {
-    places: Vec<(Box<dyn Station>, Outbox)>,
+    hosted: Vec<(Box<dyn Station>, Outbox)>,
     /// The bit rate of the bus, if it is known.
     bit_rate: Option<u32>,
 }
 
 impl Host {
     fn next_wake(&self) -> Option<Mono> {
-        self.places.iter().filter_map(|(station, _)| station.next_wake()).min()
+        self.hosted.iter().filter_map(|(station, _)| station.next_wake()).min()
     }
 
-    /// Executes the line that came with an interrupt; `false` if there is none: the user asks to stop.
+    /// Executes the line that came with an interrupt. Returns `false` without a line: then the user asks to stop.
     fn execute_line(&mut self, console: &mut Console<'_>, now: Mono) -> bool {
         let Ok(line) = console.lines.try_recv() else { return false };
         if let Err(why) = self.execute(&line, now) {
@@ -93,7 +93,7 @@ impl Host {
             return Err(USAGE.to_owned());
         }
         let node: NodeId = words.remove(1).parse().map_err(|_| USAGE.to_owned())?;
-        let devices = self.places.iter_mut().filter_map(|(station, out)| {
+        let devices = self.hosted.iter_mut().filter_map(|(station, out)| {
             let station: &mut dyn std::any::Any = &mut **station;
             Some((station.downcast_mut::<Device>()?, out))
         });
@@ -105,7 +105,7 @@ impl Host {
     }
 
     fn wake(&mut self, now: Mono) {
-        for (station, out) in &mut self.places {
+        for (station, out) in &mut self.hosted {
             if station.next_wake().is_some_and(|due| due <= now) {
                 station.wake(now, out);
             }
@@ -116,7 +116,7 @@ impl Host {
     fn retime(&mut self, bit_rate: Option<u32>) {
         if bit_rate != self.bit_rate {
             self.bit_rate = bit_rate;
-            for (station, _) in &mut self.places {
+            for (station, _) in &mut self.hosted {
                 bit_rate.into_iter().for_each(|bit_rate| station.on_bus_bit_rate(bit_rate));
             }
         }
@@ -133,9 +133,9 @@ impl Host {
 
     /// Delivers a frame to every station except its sender.
     fn deliver(&mut self, sender: Option<usize>, now: Mono, frame: &Frame) {
-        for index in 0..self.places.len() {
-            if sender != Some(index) && self.is_on_the_bus(&*self.places[index].0) {
-                let (station, out) = &mut self.places[index];
+        for index in 0..self.hosted.len() {
+            if sender != Some(index) && self.is_on_the_bus(&*self.hosted[index].0) {
+                let (station, out) = &mut self.hosted[index];
                 station.receive(now, frame, out);
             }
         }
@@ -143,23 +143,23 @@ impl Host {
 
     /// Sends pending frames, the lowest identifier first; `false` if the bus accepts no more.
     fn send(&mut self, bus: &mut dyn Bus) -> Result<bool, BusError> {
-        for index in 0..self.places.len() {
-            if !self.is_on_the_bus(&*self.places[index].0) {
-                self.places[index].1.clear();
+        for index in 0..self.hosted.len() {
+            if !self.is_on_the_bus(&*self.hosted[index].0) {
+                self.hosted[index].1.clear();
             }
         }
         loop {
-            let waiting = self.places.iter().enumerate();
+            let waiting = self.hosted.iter().enumerate();
             let heads = waiting.filter_map(|(index, (_, out))| Some((priority(out.front()?), index)));
             let Some((_, index)) = heads.min() else { return Ok(true) };
-            let Some(frame) = self.places[index].1.front().copied() else { return Ok(true) };
+            let Some(frame) = self.hosted[index].1.front().copied() else { return Ok(true) };
             match bus.send(&frame) {
                 Ok(()) => {}
                 Err(BusError::QueueFull) => return Ok(false),
                 Err(error) => return Err(error),
             }
             let now = bus.now().mono;
-            let (station, out) = &mut self.places[index];
+            let (station, out) = &mut self.hosted[index];
             out.pop();
             station.sent(now, &frame);
             self.deliver(Some(index), now, &frame);
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn device_at_another_bit_rate_neither_receives_nor_sends() {
-        // LSS switches to 125 kbit/s. Then a request follows at 250 kbit/s and the time of a heartbeat.
+        // LSS switches to 125 kbit/s. Then a request at 250 kbit/s and the time for a heartbeat follow.
         let configure = ["7E5#0401000000000000", "7E5#1300040000000000", "7E5#1500000000000000"];
         let mut plan = vec![(1, "605#2B17100064000000")];
         plan.extend(configure.iter().zip([10, 20, 30]).map(|(frame, at)| (at, *frame)));

@@ -77,7 +77,7 @@ impl Slave {
     pub(super) fn request(&mut self, request: [u8; 8], identity: Identity, settings: &mut Settings) -> Reply {
         let [service, first, second, third, fourth, ..] = request;
         let number = u32::from_le_bytes([first, second, third, fourth]);
-        // The parts of an address must follow each other directly.
+        // The parts of an address must follow each other directly, so every request resets the counts.
         let selected = std::mem::take(&mut self.selected);
         let identified = std::mem::take(&mut self.identified);
         let is_known = self.supported.services.is_empty() || self.supported.services.contains(&service);

@@ -35,7 +35,7 @@ impl Memory {
         }
     }
 
-    /// Whether a TPDO without mapped objects is sent with 0 bytes, instead of not at all.
+    /// Whether a TPDO without mapped objects is sent, with 0 bytes.
     pub(super) fn sends_empty_pdo(&self) -> bool {
         self.remap == Remap::CountOnly
     }

@@ -1,9 +1,9 @@
 //! Simulated devices, built from the device descriptions: object dictionary, SDO server, NMT, heartbeat, TPDOs,
 //! emergencies, LSS and measured values that change.
 //!
-//! Written from CiA 301, CiA 404 and the manuals, without the encoders of the client, so that tests find a mistake in
-//! either. No code depends on the name of a device: the descriptions and the files in `models/` contain the
-//! differences.
+//! The code is written from CiA 301, CiA 404 and the manuals, and does not use the encoders of the client. So tests
+//! find mistakes in both. No code depends on the name of a device: the descriptions and the files in `models/` contain
+//! the differences.
 //!
 //! A device is a [`Station`](crate::bus::memory::Station) on a [`MemoryBus`](crate::bus::memory::MemoryBus) or, through
 //! [`host`], on a real bus.

@@ -35,7 +35,7 @@ pub(super) struct Quantity {
 }
 
 impl Quantity {
-    /// `seed` is that of the bench. `serial` makes the noise of equal devices different.
+    /// `seed` is the seed of the bench. `serial` makes the noise of equal devices different.
     pub(super) fn new(
         channel: SimChannel,
         sample: Duration,
@@ -49,7 +49,7 @@ impl Quantity {
         Quantity { channel, sample: sample.max(Duration::from_nanos(1)), margin, overloads, key }
     }
 
-    /// Holds the quantity at a value from now on.
+    /// Sets the quantity to a constant value from now on.
     pub(super) fn hold(&mut self, value: f64) {
         self.channel.hold(value);
         self.overloads.clear();
@@ -106,7 +106,7 @@ impl Quantity {
         }
     }
 
-    /// Between -1 and 1: different for each sample, and the same in each run.
+    /// A number between -1 and 1, which differs between samples and is the same in each run.
     fn noise(&self, index: u64) -> f64 {
         let bits = mix(self.key ^ index) >> 11;
         bits as f64 / (1u64 << 52) as f64 - 1.0
@@ -188,7 +188,7 @@ fn between(points: &[(f64, f64)], seconds: f64) -> f64 {
     }
 }
 
-/// SplitMix64, the finalizer: every bit of the input changes half of the output.
+/// The finalizer of SplitMix64: each bit of the input changes about half of the output bits.
 fn mix(input: u64) -> u64 {
     let mut z = input.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);

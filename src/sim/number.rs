@@ -12,11 +12,11 @@ pub(super) fn to_integer(value: f64, data_type: DataType) -> i64 {
         DataType::Unsigned(width) => (0, i64::MAX >> (64 - 8 * u32::from(width.clamp(1, 8))).saturating_sub(1)),
         _ => (i64::MIN, i64::MAX),
     };
-    whole(value).clamp(low, high)
+    nearest_integer(value).clamp(low, high)
 }
 
 /// The nearest integer, computed from the bits of the number: the mantissa shifted by the exponent.
-fn whole(value: f64) -> i64 {
+fn nearest_integer(value: f64) -> i64 {
     let rounded = value.round();
     if rounded.is_nan() {
         return 0;
@@ -46,7 +46,7 @@ pub(super) fn to_bytes(value: f64, data_type: DataType) -> Vec<u8> {
     }
 }
 
-/// The nearest REAL32, converted as text: the standard library rounds once and correctly.
+/// The nearest REAL32, converted as text, because the standard library then rounds only once.
 fn to_real32(value: f64) -> f32 {
     if value.is_nan() {
         return f32::NAN;
@@ -101,7 +101,7 @@ mod tests {
     proptest! {
         #[test]
         fn whole_agrees_with_the_printed_number(value in -1e15f64..1e15) {
-            prop_assert_eq!(whole(value), format!("{:.0}", value.round()).parse::<i64>().expect("an integer"));
+            prop_assert_eq!(nearest_integer(value), format!("{:.0}", value.round()).parse::<i64>().expect("an integer"));
         }
 
         #[test]

@@ -63,7 +63,7 @@ impl Group {
     }
 
     /// Whether a command for `self` includes an entry of group `entry`.
-    fn reaches(self, entry: Group) -> bool {
+    fn includes(self, entry: Group) -> bool {
         self == Group::All || self == entry
     }
 }
@@ -88,7 +88,7 @@ pub(super) enum Area {
 }
 
 impl Area {
-    fn holds(self, object: ObjectId) -> bool {
+    fn affects(self, object: ObjectId) -> bool {
         self == Area::All || (0x1000..0x2000).contains(&object.index)
     }
 }
@@ -97,8 +97,9 @@ impl Area {
 #[derive(Clone, Debug)]
 pub(super) struct Objects {
     specs: Arc<BTreeMap<ObjectId, Spec>>,
-    /// Whether the description contains `stored` keys. Without them, every writable object is stored, by area.
-    marked: bool,
+    /// Whether the description contains `stored` keys. If not, every writable object is stored in the group of its
+    /// area.
+    has_stored_keys: bool,
     /// Whether the device has [`Quirk::SaveAllResetsCobIds`].
     resets_cob_ids: bool,
     /// Whether the device has [`Quirk::CobIdZeroIsDefault`].
@@ -108,7 +109,7 @@ pub(super) struct Objects {
 }
 
 impl Objects {
-    /// A new device under `node`.
+    /// The objects of a new device with this node-ID.
     pub(super) fn new(model: &Model, node: NodeId) -> Objects {
         // An EDS has only a dictionary.
         let plain = model.dictionary.iter().map(|entry| (entry.object, Spec::plain(entry)));
@@ -118,10 +119,10 @@ impl Objects {
                 specs.insert(object, Spec::new(entry));
             }
         }
-        let marked = specs.values().any(|spec| spec.group.is_some());
+        let has_stored_keys = specs.values().any(|spec| spec.group.is_some());
         let mut objects = Objects {
             specs: Arc::new(specs),
-            marked,
+            has_stored_keys,
             resets_cob_ids: model.description.quirks.contains(&Quirk::SaveAllResetsCobIds),
             zero_is_default: model.description.quirks.contains(&Quirk::CobIdZeroIsDefault),
             values: BTreeMap::new(),
@@ -203,13 +204,13 @@ impl Objects {
         }
     }
 
-    /// Whether the entry exists and can be written.
+    /// Checks that the entry exists and can be written.
     pub(super) fn check_writable(&self, object: ObjectId) -> Result<&Spec, Abort> {
         let spec = self.find(object)?;
         if spec.access.is_writable() { Ok(spec) } else { Err(Abort::READ_ONLY) }
     }
 
-    /// Whether the entry exists and can be read.
+    /// Checks that the entry exists and can be read.
     pub(super) fn check_readable(&self, object: ObjectId) -> Result<&Spec, Abort> {
         let spec = self.find(object)?;
         if spec.access.is_readable() { Ok(spec) } else { Err(Abort::WRITE_ONLY) }
@@ -247,7 +248,7 @@ impl Objects {
 
     /// Resets the working values to the stored ones, else to the factory defaults.
     pub(super) fn reset(&mut self, area: Area, node: NodeId) {
-        for (object, spec) in self.specs.iter().filter(|(object, _)| area.holds(**object)) {
+        for (object, spec) in self.specs.iter().filter(|(object, _)| area.affects(**object)) {
             let value = self.saved.get(object).cloned().unwrap_or_else(|| spec.factory_default(node));
             self.values.insert(*object, value);
         }
@@ -258,7 +259,7 @@ impl Objects {
     pub(super) fn save(&mut self, group: Group, node: NodeId) {
         let specs = Arc::clone(&self.specs);
         for (object, spec) in specs.iter() {
-            if !self.is_kept(group, *object, spec) {
+            if !self.is_stored_by(group, *object, spec) {
                 continue;
             }
             let reset = self.resets_cob_ids && group == Group::All && is_cob_id(*object);
@@ -285,24 +286,24 @@ impl Objects {
         let specs = Arc::clone(&self.specs);
         for (object, spec) in specs.iter() {
             // Node-ID and bit rate are not restored (MH-4, 4.3.8 and 4.3.9).
-            if spec.signature != Some(Signature::Set) && self.is_kept(group, *object, spec) {
+            if spec.signature != Some(Signature::Set) && self.is_stored_by(group, *object, spec) {
                 self.saved.remove(object);
             }
         }
     }
 
-    /// Deletes the stored COB-IDs: after the next reset, they are those of the predefined connection set.
+    /// Deletes the stored COB-IDs. After the next reset, the device uses the predefined connection set.
     pub(super) fn forget_cob_ids(&mut self) {
         self.saved.retain(|object, _| !is_cob_id(*object));
     }
 
-    fn is_kept(&self, group: Group, object: ObjectId, spec: &Spec) -> bool {
-        if self.marked {
-            return spec.group.is_some_and(|entry| group.reaches(entry));
+    fn is_stored_by(&self, group: Group, object: ObjectId, spec: &Spec) -> bool {
+        if self.has_stored_keys {
+            return spec.group.is_some_and(|entry| group.includes(entry));
         }
         let by_area = if object.index < 0x2000 { Group::Communication } else { Group::Application };
         let holds_a_value = spec.signature.is_none_or(|signature| signature == Signature::Set);
-        spec.access == Access::Rw && holds_a_value && group.reaches(by_area)
+        spec.access == Access::Rw && holds_a_value && group.includes(by_area)
     }
 }
 

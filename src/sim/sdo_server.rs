@@ -14,7 +14,7 @@ const SEGMENT_TIMEOUT: Duration = Duration::from_secs(1);
 /// The longest value that can be written.
 const MAX_LENGTH: usize = 1 << 20;
 
-/// The answer to an upload of 1 to 4 bytes.
+/// The command specifiers of answers to expedited uploads, by the number of bytes.
 const UPLOAD_COMMANDS: [u8; 5] = [0x43, 0x4f, 0x4b, 0x47, 0x43];
 
 /// The objects that the server reads and writes.
@@ -110,7 +110,7 @@ impl SdoServer {
 
     /// Whether a sub-block is being sent. Any frame from the client cancels the rest of it.
     pub(super) fn is_sending_block(&self) -> bool {
-        matches!(self.transfer, Transfer::Block { block: Block::Giving { .. }, .. })
+        matches!(self.transfer, Transfer::Block { block: Block::Sending { .. }, .. })
     }
 
     /// Handles a request and returns the answers.
@@ -159,16 +159,16 @@ impl SdoServer {
             return Ok(None);
         };
         Ok(match block.step(frame, MAX_LENGTH)? {
-            Step::On(block, answers) => {
+            Step::Continue(block, answers) => {
                 self.transfer = Transfer::Block { object, block, until: now + SEGMENT_TIMEOUT };
                 Some(answers)
             }
-            Step::Arrived(bytes, answer) => {
+            Step::Complete(bytes, answer) => {
                 memory.download(object, &bytes)?;
                 Some(vec![answer])
             }
-            Step::Over => Some(Vec::new()),
-            Step::Foreign => None,
+            Step::Finished => Some(Vec::new()),
+            Step::Invalid => None,
         })
     }
 
@@ -209,7 +209,7 @@ impl SdoServer {
         self.transfer = Transfer::None;
         let bytes = memory.upload(object)?;
         let omitted = self.style.size == SizeIndication::Omitted;
-        // Without a size, a short text is filled to four bytes. An empty text cannot be sent this way.
+        // Without a size, a short or empty text is filled to four bytes. With a size, an empty text needs segments.
         if (1..=4).contains(&bytes.len()) || (bytes.is_empty() && omitted) {
             let command = match (self.answers_60, self.style.size) {
                 (true, _) => 0x60,
@@ -315,7 +315,7 @@ impl SdoServer {
     }
 }
 
-/// The announced size, if there is a valid one.
+/// Checks the announced size; `None` if no size is announced.
 fn announced(sized: bool, data: [u8; 4], width: Option<usize>) -> Result<Option<usize>, Abort> {
     if !sized {
         return Ok(None);

@@ -107,11 +107,11 @@ impl Settings {
     /// Sets the pending node-ID, FFh for unconfigured; `false` if the number is not valid.
     pub(super) fn configure_node(&mut self, number: u8) -> bool {
         let node = NodeId::new(number).ok();
-        let is_taken = node.is_some() || number == 0xff;
-        if is_taken {
+        let is_valid = node.is_some() || number == 0xff;
+        if is_valid {
             self.pending.node = node;
         }
-        is_taken
+        is_valid
     }
 
     /// Sets the pending bit rate; `false` if the device has no such code.
@@ -128,9 +128,13 @@ impl Settings {
 
     /// Whether a write of node-ID or bit rate is allowed.
     pub(super) fn allows(&self, object: ObjectId, bytes: &[u8]) -> bool {
-        let is = |place: Option<Place>| place.is_some_and(|place| place.object == object);
+        let is_at = |place: Option<Place>| place.is_some_and(|place| place.object == object);
         let number = bytes.first().copied().unwrap_or_default();
-        if is(self.node_at) { NodeId::new(number).is_ok() } else { !is(self.rate_at) || self.rate(number).is_some() }
+        if is_at(self.node_at) {
+            NodeId::new(number).is_ok()
+        } else {
+            !is_at(self.rate_at) || self.rate(number).is_some()
+        }
     }
 
     /// Handles the write of `written`: a store command, or an object that needs no store command.
@@ -168,7 +172,7 @@ impl Settings {
         }
     }
 
-    /// The code of the active bit rate; with automatic detection, of the rate detected (MH-4, 4.3.9).
+    /// The code of the active bit rate or, with automatic detection, of the detected bit rate (MH-4, 4.3.9).
     fn shown_rate(&self) -> Option<u8> {
         let rate = match self.active.rate {
             BitRate::At(rate) => rate,

@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// 1018h:4.
+/// The serial number.
 pub(super) const SERIAL_NUMBER: ObjectId = ObjectId::new(0x1018, 4);
 
 /// The settings of a simulated device before it is switched on.
@@ -23,7 +23,7 @@ pub struct Setup {
     pub sim: SimData,
     /// The node-ID; `None`: the device is unconfigured and answers only LSS.
     pub node: Option<NodeId>,
-    /// The bit rate in bit/s; `None`: that of the bus at the first power-on.
+    /// The bit rate in bit/s; `None`: the bit rate of the bus at the first power-on.
     pub bit_rate: Option<u32>,
     /// Its serial number.
     pub serial: u32,
@@ -58,7 +58,7 @@ pub struct Oddities {
     pub answers_only: Vec<ObjectId>,
     /// Events after which the device is offline until a power cycle.
     pub offline_after: Vec<OfflineAfter>,
-    /// When it is plugged in, and when it is unplugged. `None`: it is always connected.
+    /// The time from plugging in to unplugging. `None`: the device is always connected.
     pub connected: Option<Range<Duration>>,
 }
 
@@ -72,7 +72,7 @@ pub enum OfflineAfter {
 }
 
 impl Setup {
-    /// A device as described.
+    /// A device with the values of its description.
     pub fn new(model: Arc<Model>, node: NodeId) -> Setup {
         let sim = SimData::of(&model);
         let channels = sim.channels.clone();

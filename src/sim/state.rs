@@ -21,7 +21,7 @@ const VERSION: u32 = 1;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Stored {
     pub(super) node: Option<NodeId>,
-    /// The bit rate in bit/s, if it is not that of the bus.
+    /// The bit rate in bit/s, if it differs from the bit rate of the bus.
     pub(super) bit_rate: Option<u32>,
     pub(super) objects: BTreeMap<ObjectId, Vec<u8>>,
 }
@@ -44,7 +44,7 @@ pub(super) struct StateFile {
 
 struct Inner {
     file: File,
-    /// By kind and serial number. Devices of other benches are kept.
+    /// The stored settings by kind and serial number. Devices of other benches stay in the file.
     devices: BTreeMap<(String, u32), Stored>,
 }
 

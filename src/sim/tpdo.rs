@@ -19,7 +19,7 @@ const SYNC_PERIOD: ObjectId = ObjectId::new(0x1006, 0);
 /// One TPDO.
 #[derive(Clone, Debug)]
 pub(super) struct Tpdo {
-    /// 0 for 1800h and 1A00h.
+    /// The number of the TPDO, counted from 0 (1800h and 1A00h).
     number: u16,
     style: PdoStyle,
     /// SYNCs since the last transmission.
@@ -29,7 +29,7 @@ pub(super) struct Tpdo {
     sent_at: Option<Mono>,
     /// When the event timer elapses.
     timer: Option<Mono>,
-    /// An event that waits for the end of the inhibit time.
+    /// The end of the inhibit time, if an event waits for it.
     held_back: Option<Mono>,
     watches: Vec<Watch>,
     /// The next time to compare the values that can cause an event.
@@ -119,7 +119,7 @@ impl Tpdo {
     pub(super) fn mapping(&self, objects: &Objects) -> Vec<ObjectId> {
         let map = 0x1a00 + self.number;
         let count = u8::try_from(objects.number(ObjectId::new(map, 0))).unwrap_or(0);
-        (1..=count).map(|sub| mapped(objects.number(ObjectId::new(map, sub))).0).collect()
+        (1..=count).map(|sub| split_entry(objects.number(ObjectId::new(map, sub))).0).collect()
     }
 
     /// Whether an index belongs to this TPDO.
@@ -175,7 +175,7 @@ impl Tpdo {
         }
     }
 
-    /// Handles the time `now`. Returns the cause if the event timer or an event triggers a transmission.
+    /// Handles what is due at `now`. Returns the cause if the event timer or an event triggers a transmission.
     pub(super) fn wake(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) -> Option<Cause> {
         let mut event = self.held_back.is_some_and(|due| due <= now);
         if self.compare_at.is_some_and(|due| due <= now) {
@@ -227,7 +227,7 @@ impl Tpdo {
 }
 
 impl Watch {
-    /// `None` if no event is possible.
+    /// Creates the watch of a mapped value; `None` if the value can cause no event.
     fn new(objects: &Objects, channels: &mut Channels, object: ObjectId, time: Duration) -> Option<Watch> {
         let value = channels.number(objects, object, time)?;
         let parameter = |offset| objects.real(ObjectId::new(object.index.saturating_add(offset), object.sub));
@@ -270,8 +270,8 @@ fn is_valid(cob_id: u32) -> bool {
     cob_id & 0x8000_0000 == 0
 }
 
-/// A mapping entry: the object, and its length in bits.
-fn mapped(entry: u32) -> (ObjectId, u32) {
+/// Splits a mapping entry into the object and its length in bits.
+fn split_entry(entry: u32) -> (ObjectId, u32) {
     let [bits, sub, low, high] = entry.to_le_bytes();
     (ObjectId::new(u16::from_le_bytes([low, high]), sub), bits.into())
 }
@@ -286,7 +286,7 @@ pub(super) fn check(
 ) -> Result<(), Abort> {
     let number = bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte));
     match object.index {
-        // Bit 30: the device produces SYNC.
+        // Bit 30 means that the device produces SYNC.
         COB_ID_SYNC if number & 0x4000_0000 != 0 && !objects.has(SYNC_PERIOD) => Err(Abort::VALUE),
         COB_ID_SYNC => check_identifier(number),
         COB_ID_EMCY if is_valid(number) => check_identifier(number),
@@ -296,12 +296,12 @@ pub(super) fn check(
     }
 }
 
-/// 29-bit identifiers are not supported; bits 11 to 28 belong to them.
+/// Whether a COB-ID has a 29-bit identifier (bits 11 to 29), which is not supported.
 fn is_extended(cob_id: u32) -> bool {
     cob_id & 0x3fff_f800 != 0
 }
 
-/// Whether CiA 301 allows the identifier of a COB-ID.
+/// Checks that CiA 301 allows the identifier of a COB-ID.
 fn check_identifier(cob_id: u32) -> Result<(), Abort> {
     let id = CanId::Standard(u16::try_from(cob_id & 0x7ff).unwrap_or(0));
     if is_extended(cob_id) || id.is_restricted() { Err(Abort::VALUE) } else { Ok(()) }
@@ -320,7 +320,7 @@ fn check_communication(objects: &Objects, object: ObjectId, number: u32) -> Resu
             }
         }
         2 if (241..=253).contains(&number) => return Err(Abort::VALUE),
-        // Only while the PDO is not valid.
+        // The inhibit time can change only while the PDO is not valid.
         3 if is_valid(old) && number != objects.number(object) => return Err(Abort::VALUE),
         _ => {}
     }
@@ -354,9 +354,9 @@ fn check_mapping(
     if bits > 64 { Err(Abort::PDO_LENGTH) } else { Ok(()) }
 }
 
-/// The length of a mapping entry in bits, if it can be mapped.
+/// Checks that an object can be mapped. Returns the length of its mapping entry in bits.
 fn check_mappable(objects: &Objects, entry: u32) -> Result<u32, Abort> {
-    let (object, bits) = mapped(entry);
+    let (object, bits) = split_entry(entry);
     let spec = objects.spec(object).filter(|spec| spec.pdo).ok_or(Abort::NOT_MAPPABLE)?;
     let width = spec.data_type.width().and_then(|bytes| u32::try_from(8 * bytes).ok());
     if width == Some(bits) { Ok(bits) } else { Err(Abort::NOT_MAPPABLE) }

@@ -1,6 +1,6 @@
 //! The signals of all expressions, and the statistics of their values.
 //!
-//! Many expressions use the same signal. Its statistics are computed once for each sample, not once for each expression.
+//! Many expressions use the same signal. Its statistics are computed once per sample, not once per expression.
 
 use super::bind::Input;
 use super::formula::{Formula, Values};

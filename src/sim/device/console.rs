@@ -1,4 +1,4 @@
-//! The memory of a device that lasts between runs, and the changes of a user while the simulation runs.
+//! The non-volatile memory of a device in a file, and the commands of a user while the simulation runs.
 
 use super::*;
 use crate::sim::state::{StateFile, Stored};
@@ -10,7 +10,7 @@ pub(super) struct Remembered {
 }
 
 impl Device {
-    /// Loads the non-volatile memory of the device from a file. The device then stores it there.
+    /// Loads the non-volatile memory of the device from a file. The device then stores its settings to this file.
     pub(in crate::sim) fn remembering(mut self, file: StateFile) -> Device {
         let Memory { settings, objects, .. } = &mut self.memory;
         if let Some(stored) = file.get(&self.setup.model.description.name, self.setup.serial) {
@@ -32,15 +32,15 @@ impl Device {
         let now = Stored::of(&self.memory.settings, &self.memory.objects);
         if now != remembered.last {
             let kind = &self.setup.model.description.name;
-            // A full disk: the device keeps its memory in this run, and tries again with the next change.
+            // If the disk is full, the device keeps its memory in this run. The next change tries again.
             if remembered.file.set(kind, self.setup.serial, &now).is_ok() {
                 remembered.last = now;
             }
         }
     }
 
-    /// Executes a command of the user, without its node-ID: `pressure 5.2bar`, `silent`, `talk`, `emcy F001`, `unplug`,
-    /// `plug`.
+    /// Executes a command of the user. `words` has no node-ID: `pressure 5.2bar`, `silent`, `talk`, `emcy F001`,
+    /// `unplug`, `plug`.
     pub(in crate::sim) fn command(&mut self, words: &[&str], now: Mono, out: &mut Outbox) -> Result<(), String> {
         match *words {
             ["silent"] => self.is_silent = true,

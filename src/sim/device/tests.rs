@@ -42,12 +42,12 @@ fn bus(setups: impl IntoIterator<Item = Setup>) -> MemoryBus {
     bus
 }
 
-/// The frames up to `until`.
+/// Receives the frames up to `until`.
 fn receive(bus: &mut MemoryBus, until: Mono) -> Vec<String> {
     timed(bus, until).into_iter().map(|(_, frame)| frame).collect()
 }
 
-/// The frames up to `until`, each with the millisecond of its end. Bus errors are ignored.
+/// Receives the frames up to `until`, each with the millisecond of its end. Bus errors are ignored.
 fn timed(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
     let mut frames = Vec::new();
     loop {
@@ -116,7 +116,7 @@ fn nmt_states_allow_their_services_only() {
             ("080#", "-"),
             ("000#0100", "-"),
             ("080#", "185#0000A04000"),
-            // No command, another node, too short.
+            // An unknown command, a command for another node, and a frame that is too short.
             ("000#0305", "-"),
             ("000#0206", "-"),
             ("000#02", "-"),
@@ -363,7 +363,7 @@ fn mc1609_sends_16_temperatures_in_four_tpdos() {
     }
     assert_eq!(receive(&mut bus, ms(1000)), Vec::<String>::new());
     assert_eq!(ask(&mut bus, "080#"), once);
-    // 255 with an event time of at least 100 ms; 254 is not offered.
+    // The device accepts 255 with an event timer of at least 100 ms. It rejects 254.
     play(
         &mut bus,
         &[
@@ -459,8 +459,8 @@ fn the_seed_decides_the_frames() {
         received
     };
     let first = run(1);
-    // 4 boot-ups, 2 TPDOs for each of 50 SYNCs, 4 rounds of 4 + 1 by event timers; the TPDOs at 500 ms are not complete
-    // yet.
+    // 4 boot-ups, 2 TPDOs after each of 50 SYNCs, 4 rounds of 4 + 1 TPDOs by event timers. The TPDOs at 500 ms are not
+    // complete yet.
     assert_eq!(first.len(), 4 + 100 + 20);
     assert_eq!(first, run(1));
     assert_ne!(first, run(2));

@@ -5,19 +5,19 @@ use crate::sim::settings::{BitRate, Pair};
 
 const IDENTITY: Identity = [0x362, 0x443150, 0x10000, 20002];
 
-struct Bed {
+struct TestBed {
     slave: Slave,
     settings: Settings,
     identity: Identity,
 }
 
-impl Bed {
-    fn new(kind: &str, node: Option<u8>, supported: SimLss) -> Bed {
+impl TestBed {
+    fn new(kind: &str, node: Option<u8>, supported: SimLss) -> TestBed {
         let model = catalog::by_name(kind).expect("built in");
         let node = node.map(|node| NodeId::new(node).expect("a node-ID"));
         let objects = Objects::new(&model, NodeId::MIN);
         let settings = Settings::new(&model.description, &objects, Pair { node, rate: BitRate::At(250_000) });
-        Bed { slave: Slave::new(supported, BTreeMap::new(), false), settings, identity: IDENTITY }
+        TestBed { slave: Slave::new(supported, BTreeMap::new(), false), settings, identity: IDENTITY }
     }
 
     fn ask(&mut self, request: &str) -> Reply {
@@ -44,7 +44,7 @@ fn all() -> SimLss {
 
 #[test]
 fn waiting_state_ignores_configuration_and_inquiry() {
-    let mut bed = Bed::new("mh4", Some(5), all());
+    let mut bed = TestBed::new("mh4", Some(5), all());
     for request in ["1107", "130004", "15E803", "17", "5A", "5B", "5C", "5D", "5E", "4C", "5100000000800000", "0402"] {
         assert_eq!(bed.ask(request), Reply::default(), "{request}");
     }
@@ -53,7 +53,7 @@ fn waiting_state_ignores_configuration_and_inquiry() {
 
 #[test]
 fn configuration_state_supports_every_service() {
-    let mut bed = Bed::new("mh4", Some(5), all());
+    let mut bed = TestBed::new("mh4", Some(5), all());
     bed.play(&[
         ("0401", "-"),
         ("5A", "5A62030000"),
@@ -81,14 +81,14 @@ fn configuration_state_supports_every_service() {
 
 #[test]
 fn bit_rate_codes_follow_the_device_table() {
-    let mut bed = Bed::new("dps", Some(5), all());
+    let mut bed = TestBed::new("dps", Some(5), all());
     bed.play(&[("0401", "-"), ("130005", "13"), ("130001", "1301"), ("130009", "1301")]);
     assert_eq!(bed.settings.pending.rate, BitRate::At(100_000));
-    let mut bed = Bed::new("mh4", Some(5), all());
+    let mut bed = TestBed::new("mh4", Some(5), all());
     bed.play(&[("0401", "-"), ("130009", "13")]);
     assert_eq!(bed.settings.pending.rate, BitRate::Auto);
     // If the table is unknown, the table of CiA 305 is used.
-    let mut bed = Bed::new("d20", Some(5), all());
+    let mut bed = TestBed::new("d20", Some(5), all());
     bed.play(&[("0401", "-"), ("130008", "13"), ("130005", "1301"), ("130009", "1301")]);
     assert_eq!(bed.settings.pending.rate, BitRate::At(10_000));
 }
@@ -96,7 +96,7 @@ fn bit_rate_codes_follow_the_device_table() {
 #[test]
 fn only_the_complete_address_in_order_selects() {
     let address = ["4062030000", "4150314400", "4200000100", "43224E0000"];
-    let mut bed = Bed::new("mh4", Some(5), all());
+    let mut bed = TestBed::new("mh4", Some(5), all());
     bed.play(&[(address[0], "-"), (address[1], "-"), (address[2], "-"), (address[3], "44"), ("5E", "5E05")]);
     // In configuration state the slave ignores addresses, even those of other devices.
     bed.play(&[(address[0], "-"), (address[1], "-"), (address[2], "-"), (address[3], "-"), ("5E", "5E05")]);
@@ -119,8 +119,8 @@ fn only_the_complete_address_in_order_selects() {
 
 #[test]
 fn identification_by_range() {
-    let mut bed = Bed::new("mh4", Some(5), all());
-    let ask = |bed: &mut Bed, low: u32, high: u32, last: &str| {
+    let mut bed = TestBed::new("mh4", Some(5), all());
+    let ask = |bed: &mut TestBed, low: u32, high: u32, last: &str| {
         let text = |service: u8, number: u32| {
             format!("{service:02X}{}", number.to_le_bytes().map(|b| format!("{b:02X}")).concat())
         };
@@ -139,7 +139,7 @@ fn identification_by_range() {
 }
 
 /// The search of CiA 305: the upper bits of each part, then the complete part with the number of the next part.
-fn fastscan(bed: &mut Bed) -> Identity {
+fn fastscan(bed: &mut TestBed) -> Identity {
     let mut found = [0; 4];
     bed.play(&[("5100000000800000", "4F")]);
     for part in 0..4u8 {
@@ -162,7 +162,7 @@ fn fastscan(bed: &mut Bed) -> Identity {
 #[test]
 fn fastscan_finds_an_unconfigured_device() {
     for identity in [IDENTITY, [0, 0, 0, 0], [u32::MAX; 4], [1, 0x8000_0000, 0x7fff_ffff, 0xaaaa_5555]] {
-        let mut bed = Bed { identity, ..Bed::new("mh4", None, all()) };
+        let mut bed = TestBed { identity, ..TestBed::new("mh4", None, all()) };
         bed.play(&[("4C", "50")]);
         assert_eq!(fastscan(&mut bed), identity);
         assert!(bed.slave.is_configuring());
@@ -175,7 +175,7 @@ fn fastscan_finds_an_unconfigured_device() {
 
 #[test]
 fn fastscan_skips_devices_that_do_not_match() {
-    let mut bed = Bed::new("mh4", None, all());
+    let mut bed = TestBed::new("mh4", None, all());
     // The second part before the first; a part and a bit that do not exist.
     bed.play(&[
         ("5100000000800000", "4F"),
@@ -190,7 +190,7 @@ fn fastscan_skips_devices_that_do_not_match() {
 
 #[test]
 fn endless_fastscan_answers_every_frame() {
-    let mut bed = Bed::new("mh4", None, all());
+    let mut bed = TestBed::new("mh4", None, all());
     bed.slave = Slave::new(all(), BTreeMap::new(), true);
     fastscan(&mut bed);
     bed.play(&[("5163030000000001", "4F"), ("0400", "-")]);
@@ -199,13 +199,13 @@ fn endless_fastscan_answers_every_frame() {
 #[test]
 fn unsupported_services_are_not_answered() {
     let model = catalog::by_name("dps").expect("built in");
-    let mut bed = Bed::new("dps", Some(127), crate::sim::data::SimData::of(&model).lss);
+    let mut bed = TestBed::new("dps", Some(127), crate::sim::data::SimData::of(&model).lss);
     bed.play(&[("0401", "-"), ("5A", "-"), ("5E", "-"), ("46", "-"), ("4C", "-"), ("117E", "11"), ("17", "17")]);
 }
 
 #[test]
 fn services_can_be_refused() {
-    let mut bed = Bed::new("mh4", Some(5), all());
+    let mut bed = TestBed::new("mh4", Some(5), all());
     bed.slave = Slave::new(all(), BTreeMap::from([(0x11, 0xff), (0x17, 1)]), false);
     bed.play(&[("0401", "-"), ("1107", "11FF"), ("130004", "13"), ("17", "1701")]);
     assert_eq!(bed.settings.pending.node, NodeId::new(5).ok());

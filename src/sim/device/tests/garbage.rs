@@ -21,7 +21,7 @@ fn frame() -> impl Strategy<Value = Frame> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// After random frames there is no panic, time advances, and a reset restores the factory defaults of every device.
+    /// After random frames there is no panic, time advances, and every device boots after a reset.
     #[test]
     fn any_traffic_is_survived(frames in prop::collection::vec(frame(), 1..60)) {
         let kinds = [("mh4", 1), ("d20", 2), ("mc1609", 3), ("dps", 127)];

@@ -3,11 +3,11 @@
 use super::*;
 use std::collections::BTreeMap;
 
-const AWAY: Duration = Duration::from_millis(200);
+const RESTART_TIME: Duration = Duration::from_millis(200);
 
-/// The frames until the device has booted again.
+/// Receives the frames until the device has booted again.
 fn later(bus: &mut MemoryBus) -> Vec<String> {
-    let until = bus.now().mono + AWAY;
+    let until = bus.now().mono + RESTART_TIME;
     receive(bus, until)
 }
 

@@ -44,7 +44,7 @@ fn a_store_between_restore_and_reset_keeps_the_old_values() {
         let [unit, save, load] =
             [format!("605#22316101{kpa}"), "605#2210100173617665".into(), "605#221110016C6F6164".into()];
         let read = |bus: &mut MemoryBus| ask(bus, "605#4031610100000000").pop().expect("an answer");
-        let as_delivered = read(&mut bus);
+        let factory_value = read(&mut bus);
         for frame in [unit, save, load] {
             let answer = ask(&mut bus, &frame).pop().expect("an answer");
             assert!(answer.starts_with("585#60"), "{kind}: {answer}");
@@ -56,7 +56,7 @@ fn a_store_between_restore_and_reset_keeps_the_old_values() {
         // Without the store, the restore is effective.
         ask(&mut bus, "605#221110016C6F6164");
         assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
-        assert_eq!(read(&mut bus), as_delivered, "{kind}");
+        assert_eq!(read(&mut bus), factory_value, "{kind}");
     }
 }
 
@@ -175,7 +175,7 @@ fn scaling_factor_is_applied() {
     );
 }
 
-/// The frames after a reset, from the boot-up on.
+/// Resets the device and returns the frames from the boot-up on.
 fn reset(bus: &mut MemoryBus, command: &str) -> Vec<String> {
     ask(bus, command);
     let until = bus.now().mono + Duration::from_millis(150);

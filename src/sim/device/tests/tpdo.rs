@@ -267,7 +267,7 @@ fn passing_a_limit_sends_once() {
 
 #[test]
 fn hysteresis_prevents_repeated_events() {
-    // 5 ± 1 never returns by the hysteresis of 2, so each limit is passed only once.
+    // The value (5 ± 1) never returns by the hysteresis of 2, so each limit is passed only once.
     let mut setup = constant("mh4", 5, 5.0);
     setup.channels[0].amplitude = 1.0;
     setup.channels[0].period_s = 1.0;
@@ -363,17 +363,17 @@ fn inhibit_time_separates_events() {
         bus([setup])
     };
     // Without the inhibit time: 4 / 0.1 = 40 events in a second, the fastest after 16 ms.
-    let mut free = run(0);
-    assert!((36..=40).contains(&timed(&mut free, ms(1000)).len()));
-    let mut held = run(2000);
-    let received = timed(&mut held, ms(2000));
+    let mut uninhibited = run(0);
+    assert!((36..=40).contains(&timed(&mut uninhibited, ms(1000)).len()));
+    let mut inhibited = run(2000);
+    let received = timed(&mut inhibited, ms(2000));
     let gaps: Vec<u128> = received[1..].windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
     assert!(received.len() > 8 && gaps.iter().all(|gap| *gap >= 200), "{gaps:?}");
     assert!(gaps.contains(&200), "what was held back is sent as soon as it may: {gaps:?}");
     // The inhibit time can be changed only while the PDO is not valid.
-    play(&mut held, &[("605#2B00180300000000", "585#8000180330000906")]);
-    ask(&mut held, "605#2300180185010080");
-    assert!(ask(&mut held, "605#2B00180300000000").contains(&"585#6000180300000000".to_owned()));
+    play(&mut inhibited, &[("605#2B00180300000000", "585#8000180330000906")]);
+    ask(&mut inhibited, "605#2300180185010080");
+    assert!(ask(&mut inhibited, "605#2B00180300000000").contains(&"585#6000180300000000".to_owned()));
 }
 
 #[test]
