@@ -92,7 +92,7 @@ pub struct AssignObject {
 }
 
 impl AssignObject {
-    /// The bytes that set `number`.
+    /// Encodes `number` for this object.
     ///
     /// # Errors
     /// The type cannot hold the number.
@@ -138,12 +138,12 @@ impl RateTable {
         }
     }
 
-    /// The index of a bit rate in bit/s.
+    /// Returns the index of a bit rate in bit/s.
     pub fn index_of(&self, bit_rate: u32) -> Option<u8> {
         self.rates.iter().find(|(_, rate)| **rate == bit_rate).map(|(&index, _)| index)
     }
 
-    /// The bit rate of an index in bit/s.
+    /// Returns the bit rate of an index in bit/s.
     pub fn rate_of(&self, index: u8) -> Option<u32> {
         self.rates.get(&index).copied()
     }
@@ -182,7 +182,7 @@ impl Description {
         own.unwrap_or(&self.bit_rates)
     }
 
-    /// The method of this kind, if the device has it.
+    /// Returns the method of this kind, if the device has it.
     pub fn assign_of_kind(&self, kind: AssignKind) -> Option<&AssignEntry> {
         self.assign.iter().find(|entry| entry.kind == kind)
     }

@@ -33,11 +33,11 @@ pub struct Model {
 pub struct TargetDevice {
     /// The file, or the name of a built-in description.
     pub file: String,
-    /// 1018h:1; 0 or `None` if it is not compared.
+    /// Vendor-ID (1018h:1). It is not compared if it is 0 or `None`.
     pub vendor: Option<u32>,
-    /// 1018h:2; 0 or `None` if it is not compared.
+    /// Product code (1018h:2). It is not compared if it is 0 or `None`.
     pub product: Option<u32>,
-    /// 1018h:3; 0 or `None` if it is not compared.
+    /// Revision number (1018h:3). It is not compared if it is 0 or `None`.
     pub revision: Option<u32>,
 }
 
@@ -214,7 +214,7 @@ pub fn built_in() -> &'static [Arc<Model>] {
     MODELS.get_or_init(|| (0..FILES.len()).filter_map(file).collect())
 }
 
-/// One built-in description, parsed at its first use: most commands need only one.
+/// Returns one built-in description. It is parsed at its first use, because most commands need only one.
 fn file(index: usize) -> Option<Arc<Model>> {
     static MODELS: [OnceLock<Option<Arc<Model>>>; FILES.len()] = [const { OnceLock::new() }; FILES.len()];
     let (_, text) = FILES.get(index)?;
@@ -226,12 +226,12 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
-/// The text of the built-in description with this name, including its comments.
+/// Returns the text of the built-in description with this name, including its comments.
 pub fn text(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(other, _)| *other == name).map(|(_, text)| *text)
 }
 
-/// The description with this name: the user's, else the built-in one.
+/// Returns the description with this name: the user's, else the built-in one.
 pub fn by_name(name: &str) -> Option<Arc<Model>> {
     if let Some(own) = own().iter().find(|model| model.description.name == name) {
         return Some(Arc::clone(own));
@@ -239,8 +239,8 @@ pub fn by_name(name: &str) -> Option<Arc<Model>> {
     file(names().position(|other| other == name)?)
 }
 
-/// The description with this vendor-ID and product code, if there is exactly one. It is used if nothing else about the
-/// device is known.
+/// Returns the description with this vendor-ID and product code, if there is exactly one. It is used if nothing else
+/// about the device is known.
 pub fn by_identity(vendor: u32, product: u32) -> Option<Arc<Model>> {
     let wanted = (Some(vendor), Some(product));
     let mut fitting = all().filter(|model| {
@@ -272,8 +272,8 @@ pub fn objects_to_read(traits: &IdentityAnswers) -> Vec<ObjectId> {
     objects
 }
 
-/// The description that fits the answers of a device: a description of the user, else a built-in one. If several fit,
-/// the most specific one is used. If two are equally specific, none is used.
+/// Returns the description that fits the answers of a device: a description of the user, else a built-in one. If
+/// several fit, the most specific one is used. If two are equally specific, none is used.
 pub fn recognise(traits: &IdentityAnswers) -> Option<Arc<Model>> {
     let fits = |model: &&Arc<Model>| model.has_identity(traits) && model.is_confirmed(traits);
     let best = |mut fitting: Vec<&Arc<Model>>| {
@@ -298,7 +298,7 @@ mod tests {
         NodeId::new(127).expect("a node-ID")
     }
 
-    /// The answers of a device of this description.
+    /// Returns the answers of a device with this description.
     fn traits_of(model: &Model) -> IdentityAnswers {
         let bytes = |object: ObjectId| model.dictionary.get(object).and_then(|entry| entry.default_bytes(node()));
         let number = |index, sub| {

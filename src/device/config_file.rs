@@ -65,7 +65,7 @@ impl Item {
 }
 
 impl fmt::Display for Item {
-    /// The value in tables and messages: text without quotes.
+    /// Writes the value for tables and messages: text without quotes.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Item::Text(text) => f.write_str(text),
@@ -109,7 +109,7 @@ pub struct SyntaxError {
 }
 
 impl SyntaxError {
-    /// The error of a TOML parser for this text.
+    /// Creates the error of a TOML parser for this text.
     pub fn new(text: &str, error: &toml::de::Error) -> SyntaxError {
         SyntaxError {
             place: Place::of(text, error.span().map_or(0, |span| span.start)),
@@ -147,7 +147,7 @@ impl Document {
         }
     }
 
-    /// The entry with this key.
+    /// Returns the entry with this key.
     pub fn get(&self, key: &str) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.key == key)
     }
@@ -169,7 +169,7 @@ fn item(value: &Spanned<DeValue<'_>>) -> Item {
     }
 }
 
-/// A value as TOML text.
+/// Formats a value as TOML text.
 pub fn toml_value(item: &Item) -> String {
     match item {
         Item::Text(text) => quoted(text),
@@ -179,7 +179,7 @@ pub fn toml_value(item: &Item) -> String {
     }
 }
 
-/// A key as TOML text: in quotes unless it is a bare key.
+/// Formats a key as TOML text: in quotes unless it is a bare key.
 pub fn toml_key(key: &str) -> String {
     let is_bare = |character: char| character.is_ascii_alphanumeric() || character == '-' || character == '_';
     if !key.is_empty() && key.chars().all(is_bare) { key.to_owned() } else { quoted(key) }

@@ -27,7 +27,7 @@ pub struct Entry {
     pub low: Option<Scalar>,
     /// Highest value allowed.
     pub high: Option<Scalar>,
-    /// Whether a TPDO can contain it.
+    /// Whether a TPDO can contain the object.
     pub pdo: bool,
 }
 
@@ -37,7 +37,7 @@ impl Entry {
         if self.numbered { format!("{}:{}", self.name, self.object.sub) } else { self.name.clone() }
     }
 
-    /// The default in wire order; `node` is the node-ID in `$NODEID`. `None` if no default is known.
+    /// Returns the default in wire order; `node` is the node-ID in `$NODEID`. `None` if no default is known.
     pub fn default_bytes(&self, node: NodeId) -> Option<Vec<u8>> {
         self.default.as_ref()?.encode(self.data_type, node).ok()
     }
@@ -75,7 +75,7 @@ impl Dictionary {
         }
     }
 
-    /// The full names of the objects that share this name in the file, if there are several.
+    /// Returns the full names of the objects that share this name in the file, if there are several.
     pub fn namesakes(&self, name: &str) -> Vec<String> {
         let alike = self.spellings.iter().filter(|(known, _)| **known == folded(name) || slug(known) == slug(name));
         let objects: BTreeSet<ObjectId> = alike.flat_map(|(_, objects)| objects.iter().copied()).collect();
@@ -85,7 +85,7 @@ impl Dictionary {
         objects.into_iter().filter_map(|object| Some(self.get(object)?.full_name())).collect()
     }
 
-    /// The entry at `object`.
+    /// Returns the entry at `object`.
     pub fn get(&self, object: ObjectId) -> Option<&Entry> {
         self.entries.get(&object)
     }
@@ -118,7 +118,8 @@ impl Dictionary {
         self.entries.range(ObjectId::new(index, 0)..=ObjectId::new(index, 255)).next().is_some()
     }
 
-    /// The entry with a name: `vendor-id`, `ai-input-pv:1`, or as in an EDS, `Position Value`. Letter case is ignored.
+    /// Finds the entry with a name: `vendor-id`, `ai-input-pv:1`, or `Position Value` as in an EDS. Letter case is
+    /// ignored.
     pub fn find(&self, name: &str) -> Option<&Entry> {
         let exact = self.find_exact(&name.to_lowercase());
         exact
@@ -170,7 +171,7 @@ pub fn spellings(name: &str) -> Vec<String> {
 mod tests {
     use super::*;
 
-    /// A dictionary with one run of INTEGER16 objects.
+    /// Creates a dictionary with one run of INTEGER16 objects.
     fn dictionary(at: &str, name: &str) -> Dictionary {
         let mut dictionary = Dictionary::new();
         let run: crate::device::description::ObjectRun = at.parse().expect("a run");

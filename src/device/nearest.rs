@@ -1,6 +1,6 @@
 //! Similarity of words, to suggest the name that the user may have meant.
 
-/// The number of letters to change, add or remove, to convert one word to the other (Levenshtein).
+/// Returns the number of letters to change, add or remove, to convert one word to the other (Levenshtein).
 pub fn distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

@@ -80,7 +80,7 @@ const fn array(index: u16, name: &'static str) -> Measured {
     Measured { index, name, is_array: true }
 }
 
-/// The measured values of a profile, in the order in which they are shown.
+/// Returns the measured values of a profile, in the order in which they are shown.
 pub fn measured(profile: u32) -> &'static [Measured] {
     const GENERIC_IO_INPUTS: &[Measured] = &[
         array(0x6000, "digital-input-8"),
@@ -105,7 +105,7 @@ pub fn measured(profile: u32) -> &'static [Measured] {
     }
 }
 
-/// The named objects of a profile that are not measured values.
+/// Returns the named objects of a profile that are not measured values.
 fn settings(profile: u32) -> &'static [Measured] {
     const ENCODER_SETTINGS: &[Measured] = &[
         one(0x6000, "operating-parameters"),
@@ -138,13 +138,13 @@ fn settings(profile: u32) -> &'static [Measured] {
     }
 }
 
-/// The settings of a profile. Only the first two entries of an array are included.
+/// Returns the settings of a profile. Only the first two entries of an array are included.
 pub fn settings_of(profile: u32) -> impl Iterator<Item = ObjectId> {
     let subs = |row: &Measured| if row.is_array { 1..=2 } else { 0..=0 };
     settings(profile).iter().flat_map(move |row| subs(row).map(|sub| ObjectId::new(row.index, sub)))
 }
 
-/// The name of an object of a profile.
+/// Returns the name of an object of a profile.
 pub fn name(profile: u32, object: ObjectId) -> Option<String> {
     if profile == DRIVES && object.sub == 0 {
         return DRIVE_OBJECTS.iter().find(|(index, ..)| *index == object.index).map(|(.., name)| (*name).to_owned());
@@ -157,7 +157,7 @@ pub fn name(profile: u32, object: ObjectId) -> Option<String> {
     }
 }
 
-/// The object of a profile with this name. Letter case is ignored.
+/// Returns the object of a profile with this name. Letter case is ignored.
 pub fn find(profile: u32, text: &str) -> Option<ObjectId> {
     let text = text.to_ascii_lowercase();
     let (bare, sub) = text.split_once(':').unwrap_or((&text, "0"));
@@ -306,7 +306,7 @@ pub enum Meaning {
     Factor,
 }
 
-/// The type of an object of a profile. `None` if the profile does not define it.
+/// Returns the type that a profile defines for an object. `None` if the profile does not define it.
 pub fn data_type(profile: u32, object: ObjectId) -> Option<DataType> {
     let rows = match profile {
         GENERIC_IO => GENERIC_IO_OBJECTS,
@@ -331,13 +331,13 @@ pub fn data_type(profile: u32, object: ObjectId) -> Option<DataType> {
     Some(if is_array && object.sub == 0 { U8 } else { known })
 }
 
-/// The meaning of an object of a family of CiA 404. `None` if it belongs to no family.
+/// Returns the meaning of an object in the families of CiA 404. `None` if the object belongs to no family.
 pub fn meaning(object: ObjectId) -> Option<Meaning> {
     family_type(object)?;
     FAMILY_OBJECTS.iter().find(|(low, _)| object.index & 0xfff == *low).map(|&(_, meaning)| meaning)
 }
 
-/// The type of a family of CiA 404 by the first digit of the index.
+/// Returns the type of the CiA 404 family: the first digit of the index decides.
 fn family_type(object: ObjectId) -> Option<DataType> {
     match object.index >> 12 {
         6 => Some(R32),

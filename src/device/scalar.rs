@@ -18,7 +18,7 @@ pub enum Scalar {
 }
 
 impl From<&str> for Scalar {
-    /// A formula with `$NODEID`, else plain text.
+    /// Reads a formula with `$NODEID`, else plain text.
     fn from(text: &str) -> Scalar {
         node_formula(text).map_or_else(|| Scalar::Text(text.to_owned()), Scalar::NodeIdPlus)
     }
@@ -37,7 +37,7 @@ impl fmt::Display for Scalar {
 }
 
 impl Scalar {
-    /// The bytes of this value in `data_type`, in wire order. `node` is the node-ID in `$NODEID`.
+    /// Encodes this value in `data_type`, in wire order. `node` is the node-ID in `$NODEID`.
     ///
     /// # Errors
     /// The value is out of the range of the type, or has another form.

@@ -5,8 +5,9 @@ use super::dictionary::Entry;
 use crate::canopen::object::ObjectId;
 
 impl Model {
-    /// The objects that match `query`, in ascending order. `query` is an address (`6130:1`), an index (`6130`), a name,
-    /// a name that several objects share, or a word in the name, the meaning or the values. Letter case is ignored.
+    /// Finds the objects that match `query`, in ascending order. `query` is an address (`6130:1`), an index (`6130`), a
+    /// name, a name that several objects share, or a word in the name, the meaning or the values. Letter case is
+    /// ignored.
     pub fn search(&self, query: &str) -> Vec<&Entry> {
         let query = query.trim();
         if let Ok(object) = query.parse::<ObjectId>() {

@@ -21,7 +21,7 @@ const KINDS: [(u16, &str); 16] = [
     (100, "temperature transducer"),
 ];
 
-/// The code for a word: `J`, `type K`, `Pt 100`.
+/// Finds the code for a word: `J`, `type K`, `Pt 100`.
 pub fn code(word: &str) -> Option<u16> {
     KINDS.iter().find(|(_, kind)| is_same(kind, word)).map(|(code, _)| *code)
 }

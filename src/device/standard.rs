@@ -111,7 +111,7 @@ impl Row {
     }
 }
 
-/// The entry at `object`.
+/// Returns the entry at `object`.
 pub fn entry(object: ObjectId) -> Option<Entry> {
     let (rows, prefix) = match object.index {
         0x1800..=0x19ff => (COMMUNICATION, format!("tpdo{}-", object.index - 0x17ff)),
@@ -121,7 +121,7 @@ pub fn entry(object: ObjectId) -> Option<Entry> {
     rows.iter().find_map(|row| row.entry(object, &prefix))
 }
 
-/// The fixed unit of the number in an object of CiA 301, as written in descriptions: `ms`, `100us`.
+/// Returns the fixed unit of the number in an object of CiA 301, as written in descriptions: `ms`, `100us`.
 pub fn unit(object: ObjectId) -> Option<&'static str> {
     match (object.index, object.sub) {
         (0x1006 | 0x1007, 0) => Some("us"),
@@ -131,7 +131,7 @@ pub fn unit(object: ObjectId) -> Option<&'static str> {
     }
 }
 
-/// The entry with a name: `vendor-id`, `error-history:1`, `tpdo1-mapping:2`. Letter case is ignored.
+/// Returns the entry with a name: `vendor-id`, `error-history:1`, `tpdo1-mapping:2`. Letter case is ignored.
 pub fn find(name: &str) -> Option<Entry> {
     let name = name.to_ascii_lowercase();
     let (bare, sub) = match name.split_once(':') {

@@ -165,7 +165,7 @@ impl Unit {
         }
     }
 
-    /// The unit of a symbol: `bar`, `mbar`, `kPa`, `°C` or `degC`, `deg/s`, or a raw code `0x…`. Other upper and
+    /// Parses the symbol of a unit: `bar`, `mbar`, `kPa`, `°C` or `degC`, `deg/s`, or a raw code `0x…`. Other upper and
     /// lower case (`PSI`) is accepted if the unit is unambiguous.
     pub fn from_symbol(text: &str) -> Option<Unit> {
         Unit::from_exact(text).or_else(|| match Unit::spellings(text).as_slice() {
@@ -174,7 +174,7 @@ impl Unit {
         })
     }
 
-    /// The symbols that are equal to `text` except for their case: MPa and mPa for `mpa`.
+    /// Returns the symbols that are equal to `text` except for their case: MPa and mPa for `mpa`.
     pub fn spellings(text: &str) -> Vec<String> {
         let text = ascii(text);
         let denominator = text.split_once('/').map_or("", |(_, denominator)| denominator);
@@ -261,7 +261,7 @@ impl Unit {
 }
 
 impl fmt::Display for Unit {
-    /// The symbol, or the raw code if the unit is unknown.
+    /// Writes the symbol, or the raw code if the unit is unknown.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.symbol() {
             Some(symbol) => f.write_str(&symbol),

@@ -38,8 +38,8 @@ impl Wanted {
 }
 
 impl Layout<'_> {
-    /// The signal or object that a requested value means on this node. A name that is not a signal may be the name of
-    /// an object.
+    /// Finds the signal or object that a requested value means on this node. A name that is not a signal may be the
+    /// name of an object.
     pub fn resolve(&self, item: &Wanted) -> Wanted {
         let (Wanted::Signal(signal) | Wanted::Status(signal)) = item else { return item.clone() };
         if self.signals.iter().any(|known| known.name == *signal) {
@@ -189,7 +189,7 @@ impl Decoder {
         used
     }
 
-    /// The lengths that the TPDOs of a node had, if they differ from the mapping.
+    /// Returns the lengths that the TPDOs of a node had, if they differ from the mapping.
     pub fn lengths_seen(&self, node: NodeId) -> LengthsSeen {
         let of_node = self.tpdos.iter().filter(|(_, tpdo)| tpdo.node == node);
         LengthsSeen(
@@ -197,7 +197,7 @@ impl Decoder {
         )
     }
 
-    /// The first TPDO of a node with a wrong length: its mapped and its received length in bytes.
+    /// Returns the first TPDO of a node with a wrong length: its mapped and its received length in bytes.
     pub fn wrong_length(&self, node: NodeId) -> Option<(usize, usize)> {
         let of_node = self.tpdos.iter().filter(|(_, tpdo)| tpdo.node == node && !tpdo.uses_longer);
         let lengths = of_node.filter_map(|(id, tpdo)| Some((id, (tpdo.length, tpdo.other_length?))));
@@ -296,7 +296,7 @@ impl Decoder {
         std::mem::take(&mut self.shared)
     }
 
-    /// The two TPDOs with this COB-ID, if there are two.
+    /// Returns the two TPDOs with this COB-ID, if there are two.
     pub fn shared_cob_id(&self, id: CanId) -> Option<[(NodeId, TpdoNumber); 2]> {
         let tpdo = self.tpdos.get(&id)?;
         Some([tpdo.shared_with?, (tpdo.node, tpdo.number)])
@@ -308,7 +308,7 @@ impl Decoder {
         shared.filter(|(_, [(one, _), (other, _)])| one == other)
     }
 
-    /// The node and the mapped length in bytes of the TPDO with this COB-ID.
+    /// Returns the node and the mapped length in bytes of the TPDO with this COB-ID.
     pub fn mapped_length(&self, id: CanId) -> Option<(NodeId, usize)> {
         self.tpdos.get(&id).map(|tpdo| (tpdo.node, tpdo.length))
     }
@@ -333,7 +333,7 @@ impl Decoder {
         self.tpdos.get(&id).is_some_and(|tpdo| tpdo.values.iter().any(|value| value.reading.source == source))
     }
 
-    /// The number of TPDOs of a node whose length differed from their mapping.
+    /// Returns the number of TPDOs of a node whose length differed from their mapping.
     pub fn wrong_lengths(&self, node: NodeId) -> u64 {
         self.tpdos.values().filter(|tpdo| tpdo.node == node).map(|tpdo| tpdo.wrong_lengths).sum()
     }
@@ -388,12 +388,12 @@ fn is_dummy(object: ObjectId) -> bool {
     object.index < 0x20
 }
 
-/// The source of a value of a node.
+/// Creates the source for a value of a node.
 pub fn source(node: NodeId, name: &str, unit: Option<Unit>) -> Source {
     Source { node, signal: Arc::from(name), unit: Arc::from(unit_text(unit)) }
 }
 
-/// The symbol of a unit; empty if it is unknown.
+/// Returns the symbol of a unit; empty if it is unknown.
 fn unit_text(unit: Option<Unit>) -> String {
     unit.map(|unit| unit.to_string()).unwrap_or_default()
 }

@@ -53,13 +53,13 @@ impl Histogram {
         self.longest
     }
 
-    /// The time that a `share` (0 to 1) of all times does not exceed. The error is at most 0.0125 %.
+    /// Returns the time that a `share` (0 to 1) of all times does not exceed. The error is at most 0.0125 %.
     pub fn quantile(&self, share: f64) -> Option<Duration> {
         self.clamped_rank(share, self.buckets())
     }
 
-    /// The distance from `centre` that a `share` (0 to 1) of all times does not exceed. The error is at most 0.0125 %
-    /// of the time.
+    /// Returns the distance from `centre` that a `share` (0 to 1) of all times does not exceed. The error is at most
+    /// 0.0125 % of the time.
     pub fn distance(&self, centre: Duration, share: f64) -> Option<Duration> {
         // The middle of a bucket may be later than all times in the bucket.
         let farthest = self.farthest(centre)?;
@@ -70,7 +70,7 @@ impl Histogram {
         self.rank(share, distances.into_iter()).map(|distance| distance.min(farthest))
     }
 
-    /// The greatest distance from `centre`, exact.
+    /// Returns the greatest distance from `centre`, exact.
     pub fn farthest(&self, centre: Duration) -> Option<Duration> {
         Some(centre.abs_diff(self.shortest?).max(centre.abs_diff(self.longest?)))
     }
@@ -107,13 +107,13 @@ fn nanoseconds(time: Duration) -> u64 {
     u64::try_from(time.as_nanos()).unwrap_or(LONGEST_NS).min(LONGEST_NS)
 }
 
-/// The bucket of a time: its power of two above 2^13 ns, and the twelve bits after the leading one.
+/// Returns the bucket of a time: its power of two above 2^13 ns, and the twelve bits after the leading one.
 fn bucket(time: u64) -> usize {
     let power = (u64::BITS - time.leading_zeros()).saturating_sub(FINE_BITS + 1);
     usize::try_from((u64::from(power) << FINE_BITS) + (time >> power)).unwrap_or(usize::MAX)
 }
 
-/// The time in the middle of a bucket.
+/// Returns the time in the middle of a bucket.
 fn middle(bucket: usize) -> u64 {
     let bucket = bucket as u64;
     let power = (bucket >> FINE_BITS).saturating_sub(1);

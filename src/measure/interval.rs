@@ -57,7 +57,7 @@ impl IntervalTracker {
         self.last.is_some()
     }
 
-    /// The time since the last message, if it is so long that the sender is silent.
+    /// Returns the time since the last message, if it is so long that the sender is silent.
     pub fn silence(&self, now: Mono) -> Option<Duration> {
         let limit = (self.usual().unwrap_or_default() * SILENCE_FACTOR).max(MIN_SILENCE);
         self.last.map(|last| now.since(last)).filter(|&silence| silence > limit)

@@ -50,7 +50,7 @@ pub enum Scaling {
     Fixed(Scale),
 }
 
-/// Scaling and status of a signal, if they are not those of CiA 404.
+/// Scaling and status of a signal, if they differ from CiA 404.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rules {
     /// The scaling from the number to the value.
@@ -104,7 +104,7 @@ impl Signal {
                 && PROCESS_VALUES.iter().any(|&(index, _)| index == object.index)
     }
 
-    /// The scaled number: an integer has the decimal digits of the signal. `None` for text, and for an integer whose
+    /// Scales a number: an integer has the decimal digits of the signal. `None` for text, and for an integer whose
     /// scale is unknown.
     pub fn number(&self, value: &Value) -> Option<Number> {
         let is_integer = matches!(value, Value::Integer(_) | Value::Unsigned(_));
@@ -167,8 +167,8 @@ pub struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    /// The type of an object: from the description or EDS file, else from the device profile, else from the standard.
-    /// `None` if no source states it.
+    /// Returns the type of an object: from the description or EDS file, else from the device profile, else from the
+    /// standard. `None` if no source states it.
     pub fn data_type(&self, object: ObjectId) -> Option<DataType> {
         let described = self.model.and_then(|model| {
             let is_untyped = model.untyped.contains(&object);
@@ -180,13 +180,13 @@ impl Layout<'_> {
         described.or_else(of_profile).or_else(standard)
     }
 
-    /// The type that the description states for the value of a signal outside of CiA 404.
+    /// Returns the type that the description states for the value of a signal outside of CiA 404.
     fn type_of_signal(&self, object: ObjectId) -> Option<DataType> {
         let mut own = self.signals.iter().filter(|signal| !signal.has_channel());
         own.find(|signal| signal.value_object.0 == object)?.value_object.1
     }
 
-    /// The name of an object in the description, the EDS, the profile or the standard; else its address.
+    /// Returns the name of an object in the description, the EDS, the profile or the standard; else its address.
     pub fn name_of(&self, object: ObjectId) -> String {
         let described = self.model.and_then(|model| model.dictionary.get(object)).map(|entry| entry.full_name());
         let of_profile = || self.profile.and_then(|profile| profiles::name(profile, object));
@@ -194,7 +194,7 @@ impl Layout<'_> {
         described.or_else(of_profile).or_else(standard).unwrap_or_else(|| object.to_string())
     }
 
-    /// The object with this name, in the form of [`Layout::name_of`] or of an EDS. Letter case is ignored.
+    /// Finds the object with this name, in the form of [`Layout::name_of`] or of an EDS. Letter case is ignored.
     pub fn object(&self, name: &str) -> Option<ObjectId> {
         let described = self.model.and_then(|model| model.dictionary.find(name)).map(|entry| entry.object);
         let of_profile = |name: &str| profiles::find(self.profile?, name);
@@ -214,14 +214,14 @@ impl Layout<'_> {
         objects.find(|object| signal.has_channel() && known.is_none_or(|known| known.get(*object).is_some()))
     }
 
-    /// The object of a part of a signal: `pressure.field` (x100h), `pressure.net` (x140h).
+    /// Returns the object of a part of a signal: `pressure.field` (x100h), `pressure.net` (x140h).
     pub fn part(&self, name: &str) -> Option<ObjectId> {
         let (signal, part) = name.rsplit_once('.')?;
         let (_, family_offset) = PARTS.into_iter().find(|(known, _)| *known == part)?;
         self.find_in_family(self.signals.iter().find(|known| known.name == signal)?, family_offset)
     }
 
-    /// The unit of an object: the unit of its channel, else the fixed unit in the description.
+    /// Returns the unit of an object: the unit of its channel, else the fixed unit in the description.
     pub fn unit_of(&self, object: ObjectId) -> Option<Unit> {
         let fixed = || self.model?.description.object(object)?.unit.as_deref().and_then(Unit::from_symbol);
         let of_value = |signal: &&Signal| !signal.is_value(object) || signal.rules.scaling == Scaling::Digits;
@@ -234,20 +234,20 @@ impl Layout<'_> {
         self.data_type(object).filter(|data_type| fits(*data_type, bits))
     }
 
-    /// The signal whose process value is in this object, in any of its types.
+    /// Returns the signal whose process value is in this object, in any of its types.
     pub fn value_signal(&self, object: ObjectId) -> Option<&Signal> {
         self.signals.iter().find(|signal| signal.is_value(object))
     }
 
-    /// The signal of a process value or net value that the user requested by its address. `None` for a signal with a
-    /// fixed factor: its values are shown as sent.
+    /// Returns the signal of a process value or net value that the user requested by its address. `None` for a signal
+    /// with a fixed factor: its values are shown as sent.
     pub fn measured_signal(&self, object: ObjectId) -> Option<&Signal> {
         let is_net = object.index & 0xfff == NET;
         let signal = self.value_signal(object).or_else(|| self.signal_of(object).filter(|_| is_net))?;
         (signal.rules.scaling == Scaling::Digits).then_some(signal)
     }
 
-    /// The signal of a CiA 404 process value. The object has the unit and decimal digits of this signal.
+    /// Returns the signal of a CiA 404 process value. The object has the unit and decimal digits of this signal.
     pub fn signal_of(&self, object: ObjectId) -> Option<&Signal> {
         let is_process_value = profiles::meaning(object) == Some(profiles::Meaning::Process);
         let is_404 = self.profile == Some(profiles::MEASURING) && is_process_value;

@@ -182,7 +182,7 @@ impl Reading {
         Some(Sample { value: valid.then_some(number), ..without_value(status, doubt) })
     }
 
-    /// The status of an integer that is a marker, as bits of 6150h.
+    /// Returns the status of an integer that is a marker, as bits of 6150h.
     fn marker_bits(&self, value: &Value) -> Option<u64> {
         let number = match value {
             Value::Integer(number) => *number,
@@ -200,7 +200,7 @@ impl Reading {
         }
     }
 
-    /// Whether the measuring range is larger than a value that is the limit of its type.
+    /// Whether the measuring range goes beyond a value at the limit of its type.
     fn range_goes_beyond(&self, value: f64) -> bool {
         match self.range {
             MeasuringRange::Known(start, end) if value > 0.0 => start.max(end) > value,
@@ -225,8 +225,8 @@ impl MeasuringRange {
         }
     }
 
-    /// The direction of a reported overload: the nearer end of the range or, without a known range, the sign of the
-    /// value.
+    /// Returns the direction of a reported overload: the nearer end of the range or, without a known range, the sign of
+    /// the value.
     fn nearer_end(self, value: f64) -> Status {
         let middle = if let MeasuringRange::Known(start, end) = self { f64::midpoint(start, end) } else { 0.0 };
         if value < middle { Status::OverloadLow } else { Status::OverloadHigh }

@@ -34,7 +34,7 @@ const POWERS_OF_TEN: [f64; 23] = {
 };
 
 impl Number {
-    /// The number of a decoded value. Integers get the device's decimal digits. Text and bytes are not numbers.
+    /// Converts a decoded value. Integers get the device's decimal digits. Text and bytes are not numbers.
     pub fn from_value(value: &Value, digits: u8) -> Option<Number> {
         let decimal = |mantissa| Some(Number::Decimal { mantissa, digits: digits.min(38) });
         match value {
@@ -47,7 +47,7 @@ impl Number {
         }
     }
 
-    /// The number times a factor, plus an offset. Integers stay exact. `None` if the result is too large.
+    /// Multiplies the number by a factor and adds an offset. Integers stay exact. `None` if the result is too large.
     pub fn scaled(self, scale: Scale) -> Option<Number> {
         let Scale { factor, offset } = scale;
         match self {
@@ -122,8 +122,8 @@ pub enum Status {
 }
 
 impl Status {
-    /// The status of 6150h (CiA 404): bit 0 not valid, bit 1 positive overload, bit 2 negative overload. The second
-    /// result is whether the value is valid.
+    /// Converts the bits of 6150h (CiA 404): bit 0 not valid, bit 1 positive overload, bit 2 negative overload. The
+    /// second result is whether the value is valid.
     pub fn from_bits(bits: u64) -> (Status, bool) {
         let valid = bits & 1 == 0;
         let status = match bits & 0b110 {
@@ -195,9 +195,9 @@ pub struct Source {
 /// One measured value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// When it was received.
+    /// The time when the sample was received.
     pub at: Stamp,
-    /// The number of its source.
+    /// The number of the source.
     pub source: usize,
     /// The number; `None` if it is invalid.
     pub value: Option<Number>,

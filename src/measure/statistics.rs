@@ -191,7 +191,7 @@ mod tests {
         let mean = 0.2 * after / (before + after);
         let found = statistics.mean().expect("a mean") - 1e6;
         assert!((found - mean).abs() < mean * 1e-6, "{found:e}, {mean:e}");
-        // The squares within the group around 0.2, and those of the distance between both groups.
+        // The squares within the group around 0.2, plus the squares of the distance between both groups.
         let squares = 0.01 * after + 0.04 * before * after / (before + after);
         let deviation = (squares / (before + after - 1.0)).sqrt();
         let found = statistics.deviation().expect("a deviation");

@@ -85,7 +85,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// A node of which only the node-ID is known.
+    /// Creates a node of which only the node-ID is known.
     pub fn new(id: NodeId) -> Node {
         Node {
             id,
@@ -103,13 +103,13 @@ impl Node {
         }
     }
 
-    /// A node of which only the node-ID and the description named by the user are known.
+    /// Creates a node of which only the node-ID and the description named by the user are known.
     pub fn with_overrides(id: NodeId, overrides: &Overrides) -> Node {
         let model = overrides.get(&id).cloned();
         Node { is_identified: model.is_some(), model, ..Node::new(id) }
     }
 
-    /// The unit that the description states for an object.
+    /// Returns the unit that the description states for an object.
     pub fn fixed_unit(&self, object: ObjectId) -> Option<Unit> {
         self.model.as_ref()?.description.object(object)?.unit.as_deref().and_then(Unit::from_symbol)
     }
@@ -125,7 +125,7 @@ impl Node {
         }
     }
 
-    /// The type of a mapped object: see [`Layout::mapped_type`].
+    /// Returns the type of a mapped object: see [`Layout::mapped_type`].
     pub fn mapped_type(&self, object: ObjectId, bits: u8) -> Option<DataType> {
         self.layout().mapped_type(object, bits)
     }

@@ -25,25 +25,25 @@ impl Node {
         self.model.as_ref().filter(|_| needs_it)?.description.overload_register()
     }
 
-    /// The entry of an object, from the description or the standard. Sends no request.
+    /// Returns the entry of an object, from the description or the standard. Sends no request.
     pub fn entry(&self, object: ObjectId) -> Option<Entry> {
         let described = self.model.as_ref().and_then(|model| model.dictionary.get(object).cloned());
         described.or_else(|| standard::entry(object))
     }
 
-    /// The entry with this name, from the description or the standard. Sends no request.
+    /// Returns the entry with this name, from the description or the standard. Sends no request.
     pub fn entry_by_name(&self, name: &str) -> Option<Entry> {
         let described = self.model.as_ref().and_then(|model| model.dictionary.find(name).cloned());
         let spelled = || dictionary::spellings(name).iter().find_map(|name| standard::find(name));
         described.or_else(|| standard::find(name)).or_else(spelled)
     }
 
-    /// The entry of an object in the device description, with limits and meanings.
+    /// Returns the entry of an object in the device description, with limits and meanings.
     pub fn described(&self, object: ObjectId) -> Option<&ObjectEntry> {
         self.model.as_ref()?.description.object(object)
     }
 
-    /// The name of an object; its address if it has none.
+    /// Returns the name of an object; its address if it has none.
     pub fn name_of(&self, object: ObjectId) -> String {
         self.entry(object).map_or_else(|| object.to_string(), |entry| entry.full_name())
     }
@@ -60,15 +60,15 @@ impl Node {
         described.is_some_and(|entry| !entry.access.is_writable())
     }
 
-    /// The type of an object, from the description or the standard; `None` if it is unknown or missing in the
+    /// Returns the type of an object, from the description or the standard; `None` if it is unknown or missing in the
     /// description.
     pub fn known_type(&self, object: ObjectId) -> Option<DataType> {
         let is_untyped = self.model.as_ref().is_some_and(|model| model.untyped.contains(&object));
         self.entry(object).filter(|_| !is_untyped).map(|entry| entry.data_type)
     }
 
-    /// The type of an object for a setting: as [`Layout::data_type`], else by the index (CiA 404), else UNSIGNED32. Do
-    /// not use it for measured values.
+    /// Returns the type of an object for a setting: as [`Layout::data_type`], else by the index (CiA 404), else
+    /// UNSIGNED32. Do not use it for measured values.
     ///
     /// [`Layout::data_type`]: crate::measure::layout::Layout::data_type
     pub fn data_type(&self, object: ObjectId) -> DataType {
@@ -79,7 +79,7 @@ impl Node {
         family.map_or(DataType::Unsigned(4), |&(_, data_type)| data_type)
     }
 
-    /// The object of a signal in the family of its process value. `low` is the index without its first digit.
+    /// Returns the object of a signal in the family of its process value. `low` is the index without its first digit.
     pub fn in_family(&self, signal: &Signal, low: u16) -> ObjectId {
         ObjectId::new(signal.value_object.0.index & 0xf000 | low, signal.channel)
     }
@@ -97,7 +97,7 @@ impl Node {
         self.layout().resolve(item)
     }
 
-    /// The objects that share this name in the EDS, else the objects with similar names, the nearest first.
+    /// Returns the objects that share this name in the EDS, else the objects with similar names, the nearest first.
     pub fn objects_like(&self, name: &str) -> Vec<String> {
         let Some(model) = &self.model else { return nearest(name, standard::names()) };
         match model.dictionary.namesakes(name) {
@@ -106,7 +106,7 @@ impl Node {
         }
     }
 
-    /// The similar names of objects, then the names of all signals.
+    /// Returns the similar names of objects, then the names of all signals.
     pub fn names_like(&self, name: &str) -> Vec<String> {
         let mut names = self.objects_like(name);
         names.extend(self.signals.iter().map(|signal| signal.name.clone()));
@@ -136,13 +136,13 @@ impl Node {
         event_timer_ms.filter(|&timer| timer > 0 && is_used)
     }
 
-    /// The signal with this name.
+    /// Returns the signal with this name.
     pub fn signal(&self, name: &str) -> Option<&Signal> {
         self.signals.iter().find(|signal| signal.name == name)
     }
 }
 
-/// The entry of an object. Reads the identity of the node if the object is not known without it.
+/// Returns the entry of an object. Reads the identity of the node if the object is not known without it.
 ///
 /// # Errors
 /// The node does not answer; bus errors and Ctrl-C.
@@ -153,7 +153,7 @@ pub fn entry(master: &mut Master<'_>, node: &mut Node, object: ObjectId) -> Resu
     Ok(node.entry(object))
 }
 
-/// The object with this name. Reads the identity of the node if the name is not known without it.
+/// Finds the object with this name. Reads the identity of the node if the name is not known without it.
 ///
 /// # Errors
 /// [`Error::Name`] with similar names; the node does not answer; bus errors and Ctrl-C.
@@ -174,8 +174,8 @@ pub fn resolve(master: &mut Master<'_>, node: &mut Node, name: &str) -> Result<O
     }))
 }
 
-/// The type for writing `text` to an object, from the description or the standard. Otherwise an integer as wide as the
-/// object, if the node indicates the size.
+/// Finds the type for writing `text` to an object, from the description or the standard. Otherwise an integer as wide
+/// as the object, if the node indicates the size.
 ///
 /// # Errors
 /// [`Error::TypeUnknown`]; the node does not answer; bus errors and Ctrl-C.
@@ -223,7 +223,7 @@ pub fn word(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> O
     signature(node, object, text).or_else(number)
 }
 
-/// The bytes of the signature of an object, if `text` is its word: `save`, `load`, `zero`, `tara`.
+/// Returns the bytes of the signature of an object, if `text` is its word: `save`, `load`, `zero`, `tara`.
 fn signature(node: &Node, object: ObjectId, text: &str) -> Option<Vec<u8>> {
     let standard = match object.index {
         0x1010 if object.sub > 0 => Some(Signature::Save),
@@ -238,7 +238,7 @@ fn signature(node: &Node, object: ObjectId, text: &str) -> Option<Vec<u8>> {
     (is_complete && text.eq_ignore_ascii_case(signature.as_str())).then(|| signature.as_str().as_bytes().to_vec())
 }
 
-/// The known names that are most similar to a word, at most three, the nearest first.
+/// Returns the known names that are most similar to a word, at most three, the nearest first.
 pub fn nearest(word: &str, known: impl Iterator<Item = String>) -> Vec<String> {
     let mut near: Vec<(usize, String)> = known
         .map(|known| (distance(word, &known), known))

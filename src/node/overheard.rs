@@ -44,12 +44,12 @@ impl Overheard {
         self.transfers.forget(node, is_forgotten);
     }
 
-    /// The bytes of an object.
+    /// Returns the bytes of an object.
     pub fn bytes(&self, node: NodeId, object: ObjectId) -> Option<&[u8]> {
         self.known.get(&(node, object)).map(Vec::as_slice)
     }
 
-    /// The first four bytes of an object as a number.
+    /// Returns the first four bytes of an object as a number.
     pub fn number(&self, node: NodeId, object: ObjectId) -> Option<u32> {
         self.bytes(node, object).map(first_four)
     }
@@ -59,7 +59,7 @@ impl Overheard {
         self.refused.contains(&(node, object))
     }
 
-    /// The identity of a node (1000h, 1018h, 1008h), as far as it is known.
+    /// Returns the identity of a node (1000h, 1018h, 1008h), as far as it is known.
     pub fn identity(&self, node: NodeId) -> Identity {
         let number = |index, sub| self.number(node, ObjectId::new(index, sub));
         let name = self.bytes(node, ObjectId::new(0x1008, 0));
@@ -73,7 +73,7 @@ impl Overheard {
         }
     }
 
-    /// The built-in description that fits the known identity of a node.
+    /// Returns the built-in description that fits the known identity of a node.
     pub fn recognise(&self, node: NodeId) -> Option<Arc<Model>> {
         let mut traits = self.identity(node).traits();
         let answers = self.known.iter().filter(|((of, _), _)| *of == node);
@@ -94,7 +94,7 @@ impl Overheard {
     }
 }
 
-/// The first four bytes as a number; missing bytes are 0.
+/// Returns the first four bytes as a number; missing bytes are 0.
 pub fn first_four(bytes: &[u8]) -> u32 {
     let mut wide = [0; 4];
     let len = bytes.len().min(4);

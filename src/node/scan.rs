@@ -51,7 +51,7 @@ impl Presence {
         self.answered.iter().chain(self.states.keys()).copied().collect()
     }
 
-    /// The state of a node, if a heartbeat showed it.
+    /// Returns the state of a node, if a heartbeat showed it.
     pub fn state(&self, node: NodeId) -> Option<NmtState> {
         self.states.get(&node).copied().flatten()
     }
@@ -117,7 +117,7 @@ impl Presence {
     }
 }
 
-/// The node that sends a TPDO with this identifier in the predefined connection set (CiA 301, 7.3.5).
+/// Returns the node that sends a TPDO with this identifier in the predefined connection set (CiA 301, 7.3.5).
 fn tpdo_node(id: CanId) -> Option<NodeId> {
     match id {
         CanId::Standard(number) if matches!(number & 0x780, 0x180 | 0x280 | 0x380 | 0x480) => {

@@ -59,8 +59,8 @@ fn plain(node: &Node, object: ObjectId) -> Signal {
     }
 }
 
-/// The signals of a device without channels of CiA 404: `measured` objects of its profile, then all other objects in
-/// its valid TPDOs.
+/// Creates the signals of a device without channels of CiA 404: `measured` objects of its profile, then all other
+/// objects in its valid TPDOs.
 pub(crate) fn objects(node: &Node, measured: impl IntoIterator<Item = ObjectId>) -> Vec<Signal> {
     let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
     let mapped = valid.flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object).filter(|object| object.index >= 0x20);
@@ -81,8 +81,8 @@ pub(crate) fn can_have_channels(node: &Node) -> bool {
     )
 }
 
-/// The measured values of the profile of a node, each with the object that shows whether the device has the value: the
-/// count of an array, else the value itself.
+/// Returns the measured values of the profile of a node, each with the object that shows whether the device has the
+/// value: the count of an array, else the value itself.
 pub(crate) fn profile_values(node: &Node) -> impl Iterator<Item = (Measured, ObjectId)> + use<> {
     let measured = node.identity.profile().map_or(&[][..], profiles::measured);
     let shown = node.model.clone().filter(|model| !model.dictionary.is_empty());
@@ -90,7 +90,7 @@ pub(crate) fn profile_values(node: &Node) -> impl Iterator<Item = (Measured, Obj
     measured.iter().copied().filter(known).map(|row| (row, ObjectId::new(row.index, 0)))
 }
 
-/// The objects of a measured value. `number` is the value of the object from [`profile_values`].
+/// Returns the objects of a measured value. `number` is the value of the object from [`profile_values`].
 pub(crate) fn values_of(row: Measured, number: Option<u64>) -> Vec<ObjectId> {
     let count = match (row.is_array, number) {
         (_, None) => return Vec::new(),
@@ -100,7 +100,7 @@ pub(crate) fn values_of(row: Measured, number: Option<u64>) -> Vec<ObjectId> {
     (1..=count).map(|sub| ObjectId::new(row.index, sub)).collect()
 }
 
-/// The step of a signal of a profile; `None` if the description states another unit or factor.
+/// Returns the step of a signal of a profile; `None` if the description states another unit or factor.
 pub(crate) fn step(node: &Node, signal: &Signal) -> Option<Step> {
     let is_plain = !signal.has_channel() && signal.rules.scaling == Scaling::Plain;
     let step = profiles::step(node.identity.device_type?, signal.value_object.0).filter(|_| is_plain)?;
@@ -117,7 +117,7 @@ pub(crate) fn set_step(signal: &mut Signal, step: Step, number: Option<u64>) {
     signal.unit = Unit::from_symbol(step.unit);
 }
 
-/// The objects that unit and scaling of the signals depend on.
+/// Returns the objects that unit and scaling of the signals depend on.
 pub(crate) fn scaling_objects(node: &Node) -> Vec<ObjectId> {
     let of_signal = |signal: &Signal| {
         let step = node.identity.device_type.and_then(|device_type| profiles::step(device_type, signal.value_object.0));
@@ -134,8 +134,8 @@ pub(crate) fn unit_and_digits(node: &Node, signal: &Signal) -> [Option<ObjectId>
     [unit_object(node, signal), digits.filter(|_| signal.rules.scaling == Scaling::Digits)]
 }
 
-/// The object with the unit code of a signal: from its description, else 6131h of its channel. `None` if the unit is
-/// fixed.
+/// Returns the object with the unit code of a signal: from its description, else 6131h of its channel. `None` if the
+/// unit is fixed.
 pub(crate) fn unit_object(node: &Node, signal: &Signal) -> Option<ObjectId> {
     let entry = entry(node, signal);
     let is_fixed = entry.is_some_and(|entry| entry.fixed_unit.is_some())
@@ -145,7 +145,7 @@ pub(crate) fn unit_object(node: &Node, signal: &Signal) -> Option<ObjectId> {
     entry.and_then(|entry| entry.unit).or(of_channel)
 }
 
-/// The signal in the description of the node.
+/// Finds the signal in the description of the node.
 fn entry<'a>(node: &'a Node, signal: &Signal) -> Option<&'a SignalEntry> {
     let described = node.model.as_ref()?.description.signals.iter();
     described.into_iter().find(|entry| entry.name == signal.name && entry.value == signal.value_object.0)

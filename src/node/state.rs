@@ -75,12 +75,12 @@ pub struct StateReport {
 }
 
 impl StateReport {
-    /// A node in a known state.
+    /// Creates the report of a node in a known state.
     pub fn known(node: NodeId, state: NmtState, by: Proof) -> StateReport {
         StateReport { node, state: Some(state), by, is_present: true }
     }
 
-    /// A node in an unknown state.
+    /// Creates the report of a node in an unknown state.
     pub fn unknown(node: NodeId, is_present: bool) -> StateReport {
         StateReport { node, state: None, by: Proof::None, is_present }
     }
@@ -131,7 +131,7 @@ impl LifeWatch {
         }
     }
 
-    /// The state that the last heartbeat of a node showed.
+    /// Returns the state that the last heartbeat of a node showed.
     pub fn state(&self, node: NodeId) -> Option<NmtState> {
         match self.lives.get(&node) {
             Some(Life::State(state)) => Some(*state),
@@ -224,7 +224,7 @@ pub fn state(master: &mut Master<'_>, node: NodeId) -> Result<Option<NmtState>, 
     Ok(states(master, &[node])?.first().and_then(|report| report.state))
 }
 
-/// The state that the next heartbeat of a node shows. `period` is its heartbeat time (1017h). Sends nothing.
+/// Waits for the next heartbeat of a node and returns its state. `period` is the heartbeat time (1017h). Sends nothing.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.

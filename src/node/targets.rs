@@ -14,7 +14,7 @@ use crate::master::{Error, Master};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// The nodes on the bus, in ascending order. `timeout` and `rounds` as in [`scan::find`].
+/// Finds the nodes on the bus, in ascending order. `timeout` and `rounds` as in [`scan::find`].
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.

@@ -128,7 +128,7 @@ impl Transfers {
         self.second_answers.pop_front()
     }
 
-    /// When the next transfer without an answer ends.
+    /// The time at which the next transfer without an answer ends.
     pub fn next_deadline(&self) -> Option<Mono> {
         self.open.iter().map(Open::deadline).min()
     }

@@ -179,7 +179,7 @@ pub fn is_signature(data: &[u8]) -> bool {
 }
 
 impl<'a> WriteOptions<'a> {
-    /// The default options.
+    /// Creates the default options.
     pub fn new(progress: &'a mut dyn FnMut(Moved), watch: &'a mut dyn FnMut(&Received)) -> WriteOptions<'a> {
         WriteOptions {
             form: Form::Auto,
@@ -192,7 +192,7 @@ impl<'a> WriteOptions<'a> {
     }
 }
 
-/// The forms, in the order in which they are tried.
+/// Returns the forms, in the order in which they are tried.
 fn sizes(node: &Node, form: Form) -> [DownloadSize; 2] {
     let described = node.model.as_ref().map(|model| model.description.sdo.size);
     match (form, described) {
@@ -264,7 +264,7 @@ fn read_back(
     Ok(Some(may_be_equal && uploaded.bytes.get(..data.len()) == Some(data)))
 }
 
-/// The frame that was received instead of the answer.
+/// Returns the frame that was received instead of the answer.
 fn frame_instead_of_answer(error: &SdoError) -> Option<Frame> {
     match error.failure {
         SdoFailure::NoAnswer { missed, .. } => missed.frame,

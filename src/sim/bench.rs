@@ -162,7 +162,7 @@ impl Bench {
         Ok(Bench { clock: file.clock.into(), bit_rate, retime: file.retime, record, state, devices })
     }
 
-    /// Keeps the stored settings of the devices in this file, if it is given.
+    /// Uses this file for the stored settings of the devices, if it is given.
     pub fn with_state(self, path: Option<PathBuf>) -> Bench {
         Bench { state: path.or(self.state), ..self }
     }
@@ -172,7 +172,8 @@ impl Bench {
         self.clock
     }
 
-    /// The devices. With `state`, they have the settings stored in the last run. With `record`, they have a recorder.
+    /// Returns the devices. With `state`, they have the settings stored in the last run. With `record`, they have a
+    /// recorder.
     ///
     /// # Errors
     /// The record cannot be written; the state file has another format, or another process uses it.
@@ -188,7 +189,7 @@ impl Bench {
         Ok(self.devices.into_iter().map(|device| device.recording(recorder.clone())).collect())
     }
 
-    /// A bus with the devices attached and switched on.
+    /// Creates a bus with the devices attached and switched on.
     ///
     /// # Errors
     /// The record cannot be written.

@@ -129,7 +129,7 @@ impl Channels {
         Ok(())
     }
 
-    /// The bytes of an object with a measurement at `time`; `None` for any other object.
+    /// Encodes the object with a measurement at `time`; `None` for any other object.
     pub(super) fn read(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Vec<u8>> {
         let (index, content) = *self.contents.get(&object)?;
         let data_type = objects.spec(object)?.data_type;
@@ -137,7 +137,7 @@ impl Channels {
         Some(channel.read(objects, content, data_type, time))
     }
 
-    /// The meaning of a mapped object, if it is a measured value.
+    /// Returns the meaning of a mapped object, if it is a measured value.
     pub(super) fn reading(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Reading> {
         let (index, ObjectContent::Value) = *self.contents.get(&object)? else { return None };
         let channel = self.list.get(index)?;
@@ -157,8 +157,8 @@ impl Channels {
         self.contents.get(&object).is_some_and(|(_, content)| *content == ObjectContent::Status)
     }
 
-    /// The measured value at `time` as the number in the object, without marker and rounding. For an integer, the value
-    /// is multiplied by its power of ten.
+    /// Returns the measured value at `time` as the number in the object, without marker and rounding. For an integer,
+    /// the value is multiplied by its power of ten.
     pub(super) fn number(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<f64> {
         let (index, ObjectContent::Value) = *self.contents.get(&object)? else { return None };
         let channel = self.list.get_mut(index)?;
@@ -167,7 +167,7 @@ impl Channels {
         Some(channel.scaled(objects, data_type, channel.value(objects, raw)))
     }
 
-    /// The lowest and highest possible number of [`Channels::number`].
+    /// Returns the lowest and highest possible number of [`Channels::number`].
     pub(super) fn reach(&self, objects: &Objects, object: ObjectId) -> Option<(f64, f64)> {
         let (channel, data_type) = self.value_of(objects, object)?;
         let (low, high) = channel.quantity.reach();
@@ -175,7 +175,7 @@ impl Channels {
         Some((a.min(b), a.max(b)))
     }
 
-    /// The time of the next sample of an object.
+    /// Returns the time of the next sample of an object.
     pub(super) fn next_sample(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Duration> {
         let (channel, _) = self.value_of(objects, object)?;
         Some(channel.quantity.next_sample(time))
@@ -186,12 +186,12 @@ impl Channels {
         Some((self.list.get(index)?, objects.spec(object)?.data_type))
     }
 
-    /// Every channel with the direction of its overload at `time`.
+    /// Returns every channel with the direction of its overload at `time`.
     pub(super) fn overloads(&self, time: Duration) -> impl Iterator<Item = (u8, Option<Direction>)> {
         self.list.iter().map(move |channel| (channel.signal.channel, channel.quantity.overload(time)))
     }
 
-    /// The time of the next change in [`Channels::overloads`].
+    /// Returns the time of the next change in [`Channels::overloads`].
     pub(super) fn next_overload_change(&self, time: Duration) -> Option<Duration> {
         self.list.iter().filter_map(|channel| channel.quantity.next_change(time)).min()
     }
@@ -254,8 +254,8 @@ impl Channels {
         true
     }
 
-    /// A limit that exists in several types is one quantity: a write changes it in all types. A change of the decimal
-    /// digits also changes its integers.
+    /// Copies a written limit to its other types, because it is one quantity. A change of the decimal digits also
+    /// changes the integers of all limits.
     pub(super) fn share(&self, objects: &mut Objects, written: ObjectId) {
         for channel in &self.list {
             let is_in_unit = channel.objects_in_unit.iter().any(|(object, _)| *object == written);
@@ -329,7 +329,7 @@ impl Channel {
         Channel { signal: signal.clone(), quantity, filter, seen: None, follows, converted: BTreeMap::new() }
     }
 
-    /// The objects that contain a value of this channel.
+    /// Returns the objects that contain a value of this channel.
     fn contents(&self, objects: &Objects, alone: bool) -> Vec<(ObjectId, ObjectContent)> {
         let sub = self.signal.channel;
         let mut contents: Vec<(ObjectId, ObjectContent)> = Vec::new();
@@ -380,7 +380,7 @@ impl Channel {
         }
     }
 
-    /// The measured quantity at `time` after the filter.
+    /// Returns the measured quantity at `time` after the filter.
     fn filtered(&mut self, time: Duration) -> f64 {
         self.filter.value(&self.quantity, time)
     }
@@ -393,14 +393,14 @@ impl Channel {
         converted * factor + offset
     }
 
-    /// The object with the offset: 6127h with a factor, else x124h.
+    /// Returns the object with the offset: 6127h with a factor, else x124h.
     fn offset_object(&self, objects: &Objects) -> Option<ObjectId> {
         let sub = self.signal.channel;
         let candidates = [0x6127, 0x6124, 0x7124, 0x8124, 0x9124];
         candidates.into_iter().map(|index| ObjectId::new(index, sub)).find(|object| objects.has(*object))
     }
 
-    /// The object with the tare zero.
+    /// Returns the object with the tare zero.
     fn tare_object(&self, objects: &Objects) -> Option<ObjectId> {
         let candidates = FAMILIES.map(|family| ObjectId::new(family | 0x138, self.signal.channel));
         candidates.into_iter().find(|object| objects.has(*object))
@@ -421,7 +421,7 @@ impl Channel {
         }
     }
 
-    /// The number in the status object.
+    /// Returns the number in the status object.
     fn status(&self, overload: Option<Direction>) -> f64 {
         let bits = status(overload);
         let Some(own) = &self.signal.status_bits else { return f64::from(bits) };
@@ -443,7 +443,7 @@ impl Channel {
         Unit(object.map_or(self.quantity.channel().unit, |object| objects.number(object)))
     }
 
-    /// The value of an object in the unit of the channel.
+    /// Returns the value of an object in the unit of the channel.
     fn pv(&self, objects: &Objects, object: ObjectId) -> Option<f64> {
         let number = objects.real(object)?;
         Some(match objects.spec(object)?.data_type {
@@ -473,12 +473,12 @@ impl Channel {
     }
 }
 
-/// The REAL32 form of an object of CiA 404.
+/// Returns the REAL32 form of an object of CiA 404.
 fn real_form(object: ObjectId) -> ObjectId {
     ObjectId::new(0x6000 | object.index & 0x0fff, object.sub)
 }
 
-/// The bits of 6150h: bit 0 invalid, bit 1 positive, bit 2 negative overload.
+/// Returns the bits of 6150h: bit 0 invalid, bit 1 positive, bit 2 negative overload.
 pub(super) fn status(overload: Option<Direction>) -> u8 {
     match overload {
         None => 0b000,
@@ -487,7 +487,7 @@ pub(super) fn status(overload: Option<Direction>) -> u8 {
     }
 }
 
-/// The bytes that are sent instead of an invalid value (MH-4, 4.2.15): NaN, or the smallest integer.
+/// Returns the bytes that are sent instead of an invalid value (MH-4, 4.2.15): NaN, or the smallest integer.
 fn marker(data_type: DataType) -> Vec<u8> {
     match data_type {
         DataType::Integer(_) => number::to_bytes(f64::NEG_INFINITY, data_type),

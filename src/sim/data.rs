@@ -31,7 +31,7 @@ pub struct SimData {
     pub overload_percent: f64,
     /// The emergency code of an overload, if the device sends one.
     pub overload_emcy: Option<u16>,
-    /// The services of its LSS slave.
+    /// The services of the LSS slave.
     #[serde(default)]
     pub lss: SimLss,
     /// The measured quantities, one per signal.
@@ -113,7 +113,7 @@ impl SimChannel {
 }
 
 impl SimData {
-    /// The data of a device: from its file, else from its description.
+    /// Returns the data of a device: from its file, else from its description.
     pub fn of(model: &Model) -> SimData {
         static PARSED: [OnceLock<SimData>; FILES.len()] = [const { OnceLock::new() }; FILES.len()];
         let name = &model.description.name;
@@ -151,7 +151,7 @@ impl SimData {
     }
 }
 
-/// The default of an object; an integer is divided by the power of ten of its decimal digits.
+/// Returns the default of an object. An integer is divided by the power of ten of its decimal digits.
 fn number(model: &Model, object: ObjectId, digits: Option<ObjectId>) -> Option<f64> {
     let entry = model.dictionary.get(object)?;
     let number = entry.data_type.decode(&entry.default_bytes(NodeId::MIN)?).ok()?.as_f64()?;

@@ -88,7 +88,7 @@ pub struct Device {
 }
 
 impl Device {
-    /// A device that is switched off.
+    /// Creates a device that is switched off.
     ///
     /// # Errors
     /// An object of `setup.set` does not exist or cannot hold the value.
@@ -147,12 +147,12 @@ impl Device {
         self
     }
 
-    /// Its present node-ID; `None` if it is unconfigured.
+    /// The present node-ID; `None` if the device is unconfigured.
     pub fn node(&self) -> Option<NodeId> {
         self.memory.settings.active.node
     }
 
-    /// Its present bit rate in bit/s; `None` if it uses the bit rate of the bus.
+    /// The present bit rate in bit/s; `None` if the device uses the bit rate of the bus.
     pub fn bit_rate(&self) -> Option<u32> {
         fixed(self.memory.settings.active.rate)
     }
@@ -163,12 +163,12 @@ impl Device {
         (node, fixed(rate))
     }
 
-    /// Whether it is in LSS configuration state.
+    /// Whether the device is in LSS configuration state.
     pub fn is_configuring(&self) -> bool {
         self.lss.is_configuring()
     }
 
-    /// Its NMT state; `None` while it is off or initialising.
+    /// The NMT state; `None` while the device is off or initialising.
     pub fn state(&self) -> Option<State> {
         match self.phase {
             Phase::Running(state) => Some(state),
@@ -177,7 +177,7 @@ impl Device {
         }
     }
 
-    /// The bytes of an object at `now`, independent of its access; `None` if it does not exist.
+    /// Returns the bytes of an object at `now`, independent of its access; `None` if it does not exist.
     pub fn value(&mut self, object: ObjectId, now: Mono) -> Option<Vec<u8>> {
         self.memory.value(object, now.since_start())
     }
@@ -228,7 +228,7 @@ impl Device {
         }
     }
 
-    /// Resets the device: pending frames are dropped, and it initialises.
+    /// Resets the device: drops pending frames, and starts the initialisation.
     fn reset(&mut self, area: Area, now: Mono, out: &mut Outbox) {
         self.drop_pending(out);
         if area == Area::All {
@@ -416,7 +416,7 @@ impl Device {
         }
     }
 
-    /// The lines of the record for a TPDO.
+    /// Returns the lines of the record for a TPDO.
     fn lines(&self, values: &[(ObjectId, Vec<u8>)], time: Duration) -> Vec<Line> {
         let Memory { objects, channels, node, .. } = &self.memory;
         let mapped: Vec<ObjectId> = values.iter().map(|(object, _)| *object).collect();
@@ -464,13 +464,13 @@ impl Device {
     }
 }
 
-/// The next due time: one period after `due`, to avoid drift. If that time has passed, one period after `now`.
+/// Returns the next due time: one period after `due`, to avoid drift. If that time has passed, one period after `now`.
 pub(super) fn next_due(due: Mono, period: Duration, now: Mono) -> Mono {
     let next = due + period;
     if next > now { next } else { now + period }
 }
 
-/// The name of the object that counts the overloads of a direction (DPS 2004h and 2005h).
+/// Returns the name of the object that counts the overloads of a direction (DPS 2004h and 2005h).
 fn counter(direction: Direction) -> &'static str {
     match direction {
         Direction::High => "span-overflow-count",

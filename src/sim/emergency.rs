@@ -137,7 +137,7 @@ impl Emergencies {
         })
     }
 
-    /// The number of errors that 1003h can hold.
+    /// Returns the number of errors that 1003h can hold.
     fn capacity(&self, objects: &Objects) -> usize {
         (1..=254).take_while(|sub| objects.has(HISTORY.with_sub(*sub))).count()
     }
@@ -160,7 +160,7 @@ impl Emergencies {
         }
     }
 
-    /// The next message, if there is one and the inhibit time has passed.
+    /// Returns the next message, if there is one and the inhibit time has passed.
     pub(super) fn next_frame(&mut self, objects: &Objects, node: NodeId, now: Mono) -> Option<Frame> {
         if now < self.inhibited_until {
             return None;
@@ -181,13 +181,13 @@ impl Emergencies {
     }
 }
 
-/// The repeat period of a pending error; `None` if it is sent once.
+/// Returns the repeat period of a pending error; `None` if it is sent once.
 fn repeat_time(objects: &Objects) -> Option<Duration> {
     let (object, _) = objects.specs().find(|(_, spec)| spec.name == "emcy-repeat-time")?;
     Some(objects.number(object)).filter(|&period| period > 0).map(|period| Duration::from_millis(period.into()))
 }
 
-/// The COB-ID of emergencies: 1014h, unless its bit 31 disables them.
+/// Returns the COB-ID of emergencies: 1014h, unless its bit 31 disables them.
 fn cob_id(objects: &Objects, node: NodeId) -> Option<CanId> {
     if !objects.has(EMCY_COB_ID) {
         return Some(CanId::emergency(node));

@@ -91,7 +91,7 @@ impl Filter {
         self.is_new = true;
     }
 
-    /// The filtered quantity at `time`. An overload passes unfiltered and restarts the filter.
+    /// Returns the filtered quantity at `time`. An overload passes unfiltered and restarts the filter.
     pub(super) fn value(&mut self, quantity: &Quantity, time: Duration) -> f64 {
         let present = quantity.index(time);
         if self.kind == Kind::None {
@@ -123,7 +123,7 @@ impl Filter {
             }
             Kind::SincePdo if missing > window.saturating_add(longest) => {
                 self.next = present - window;
-                // The mean has its greatest length.
+                // The mean already covers its longest time.
                 (self.is_new, self.count) = (false, longest);
             }
             // Skips whole means, so that later means still end at the same samples.
@@ -165,8 +165,8 @@ impl Filter {
     }
 }
 
-/// The constant of a moving average for a damping time: after this time, the value is within 1 % of a step. MH-4, 4.3.7
-/// gives this meaning of 2023h, but not its formula.
+/// Returns the constant of a moving average for a damping time: after this time, the value is within 1 % of a step.
+/// MH-4, 4.3.7 gives this meaning of 2023h, but not its formula.
 pub(super) fn constant_for(damping: Duration, sample_us: u128) -> u16 {
     let steps = damping.as_micros() as f64 / sample_us as f64;
     // (1 - 1/N)^steps = 0.01
@@ -200,7 +200,7 @@ mod tests {
         shown
     }
 
-    /// A quantity around 5 with noise of 1 and a new sample every millisecond.
+    /// Creates a quantity around 5 with noise of 1 and a new sample every millisecond.
     fn noisy(overloads: Vec<Overload>) -> Quantity {
         let channel = toml::from_str(
             "channel = 1\nunit = 0x4E0000\nbase = 5.0\namplitude = 2.0\nperiod_s = 4.0\nnoise = 1.0\nstart = 0.0\nend = 10.0",

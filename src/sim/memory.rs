@@ -27,7 +27,7 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// The bytes of an object at `time`, independent of its access.
+    /// Returns the bytes of an object at `time`, independent of its access.
     pub(super) fn value(&mut self, object: ObjectId, time: Duration) -> Option<Vec<u8>> {
         match self.channels.read(&self.objects, object, time) {
             Some(shown) => Some(shown),
@@ -40,7 +40,7 @@ impl Memory {
         self.remap == Remap::CountOnly
     }
 
-    /// The memory for one request.
+    /// Gives access to the memory for one request.
     pub(super) fn at(&mut self, time: Duration, pre_operational: bool) -> Access<'_> {
         Access { memory: self, time, pre_operational, written: None }
     }

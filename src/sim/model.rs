@@ -35,7 +35,7 @@ pub(super) struct Quantity {
 }
 
 impl Quantity {
-    /// `seed` is the seed of the bench. `serial` makes the noise of equal devices different.
+    /// Creates a quantity. `seed` is the seed of the bench. `serial` makes the noise of equal devices different.
     pub(super) fn new(
         channel: SimChannel,
         sample: Duration,
@@ -64,12 +64,12 @@ impl Quantity {
         &self.channel
     }
 
-    /// The number of the sample at `time`.
+    /// Returns the number of the sample at `time`.
     pub(super) fn index(&self, time: Duration) -> u64 {
         u64::try_from(time.as_nanos() / self.sample.as_nanos()).unwrap_or(u64::MAX)
     }
 
-    /// The time of the first sample after `time`.
+    /// Returns the time of the first sample after `time`.
     pub(super) fn next_sample(&self, time: Duration) -> Duration {
         self.sample_time(self.index(time).saturating_add(1))
     }
@@ -79,12 +79,12 @@ impl Quantity {
         Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
     }
 
-    /// The quantity at `time`, in the unit of the channel.
+    /// Returns the quantity at `time`, in the unit of the channel.
     pub(super) fn at(&self, time: Duration) -> f64 {
         self.sample(self.index(time))
     }
 
-    /// The sample with this number.
+    /// Returns the sample with this number.
     pub(super) fn sample(&self, index: u64) -> f64 {
         let sampled = self.sample_time(index);
         let channel = &self.channel;
@@ -106,7 +106,7 @@ impl Quantity {
         }
     }
 
-    /// A number between -1 and 1, which differs between samples and is the same in each run.
+    /// Returns a number between -1 and 1, which differs between samples and is the same in each run.
     fn noise(&self, index: u64) -> f64 {
         let bits = mix(self.key ^ index) >> 11;
         bits as f64 / (1u64 << 52) as f64 - 1.0
@@ -119,12 +119,12 @@ impl Quantity {
             .map(|overload| overload.direction)
     }
 
-    /// The direction of the overload at `time`, if there is one.
+    /// Returns the direction of the overload at `time`, if there is one.
     pub(super) fn overload(&self, time: Duration) -> Option<Direction> {
         self.beyond(self.at(time))
     }
 
-    /// The direction in which a value is outside of the limits.
+    /// Returns the direction in which a value is outside of the limits.
     pub(super) fn beyond(&self, value: f64) -> Option<Direction> {
         if value > self.channel.end + self.margin {
             Some(Direction::High)
@@ -135,7 +135,7 @@ impl Quantity {
         }
     }
 
-    /// The next time after `time` at which an overload may begin or end.
+    /// Returns the next time after `time` at which an overload may begin or end.
     pub(super) fn next_change(&self, time: Duration) -> Option<Duration> {
         let edges = self.overloads.iter().flat_map(|overload| [overload.from, overload.until]);
         // A change becomes visible in the first sample at or after it.
@@ -177,7 +177,7 @@ impl Quantity {
     }
 }
 
-/// The value at a time, interpolated between two points. Before the first point and after the last one, the value is
+/// Interpolates the value at a time between two points. Before the first point and after the last one, the value is
 /// constant.
 fn between(points: &[(f64, f64)], seconds: f64) -> f64 {
     let next = points.partition_point(|(at, _)| *at <= seconds);
@@ -188,7 +188,7 @@ fn between(points: &[(f64, f64)], seconds: f64) -> f64 {
     }
 }
 
-/// The finalizer of SplitMix64: each bit of the input changes about half of the output bits.
+/// Mixes bits with the finalizer of SplitMix64: each bit of the input changes about half of the output bits.
 fn mix(input: u64) -> u64 {
     let mut z = input.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);

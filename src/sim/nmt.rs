@@ -34,7 +34,7 @@ pub(super) enum Command {
 }
 
 impl Command {
-    /// The command in `frame`, if it is an NMT command for this node (CiA 301, 7.2.8.3.1).
+    /// Returns the command in `frame`, if it is an NMT command for this node (CiA 301, 7.2.8.3.1).
     pub(super) fn for_node(node: NodeId, frame: &Frame) -> Option<Command> {
         let (id, &[specifier, target]) = (frame.id(), frame.data()) else { return None };
         if id != CanId::NMT || target != 0 && target != node.get() {

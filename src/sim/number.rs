@@ -15,7 +15,7 @@ pub(super) fn to_integer(value: f64, data_type: DataType) -> i64 {
     nearest_integer(value).clamp(low, high)
 }
 
-/// The nearest integer, computed from the bits of the number: the mantissa shifted by the exponent.
+/// Rounds to the nearest integer, computed from the bits of the number: the mantissa shifted by the exponent.
 fn nearest_integer(value: f64) -> i64 {
     let rounded = value.round();
     if rounded.is_nan() {
@@ -34,7 +34,7 @@ fn nearest_integer(value: f64) -> i64 {
     if rounded.is_sign_negative() { -magnitude } else { magnitude }
 }
 
-/// The bytes of `value` in a numeric type, in wire order.
+/// Encodes `value` in a numeric type, in wire order.
 pub(super) fn to_bytes(value: f64, data_type: DataType) -> Vec<u8> {
     match data_type {
         DataType::Real32 => to_real32(value).to_le_bytes().to_vec(),
@@ -46,7 +46,7 @@ pub(super) fn to_bytes(value: f64, data_type: DataType) -> Vec<u8> {
     }
 }
 
-/// The nearest REAL32, converted as text, because the standard library then rounds only once.
+/// Rounds to the nearest REAL32, converted as text, because the standard library then rounds only once.
 fn to_real32(value: f64) -> f32 {
     if value.is_nan() {
         return f32::NAN;

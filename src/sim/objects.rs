@@ -51,7 +51,7 @@ pub(super) enum Group {
 }
 
 impl Group {
-    /// The group of a sub-index of 1010h and 1011h.
+    /// Returns the group of a sub-index of 1010h and 1011h.
     pub(super) fn of_sub(sub: u8) -> Option<Group> {
         Some(match sub {
             1 => Group::All,
@@ -109,7 +109,7 @@ pub(super) struct Objects {
 }
 
 impl Objects {
-    /// The objects of a new device with this node-ID.
+    /// Creates the objects of a new device with this node-ID.
     pub(super) fn new(model: &Model, node: NodeId) -> Objects {
         // An EDS has only a dictionary.
         let plain = model.dictionary.iter().map(|entry| (entry.object, Spec::plain(entry)));
@@ -149,12 +149,12 @@ impl Objects {
         self.specs.range(ObjectId::new(index, 0)..=ObjectId::new(index, 255)).next().is_some()
     }
 
-    /// The working value.
+    /// Returns the working value.
     pub(super) fn bytes(&self, object: ObjectId) -> Option<&[u8]> {
         self.values.get(&object).map(Vec::as_slice)
     }
 
-    /// The working value as an unsigned number of at most four bytes; 0 if there is none.
+    /// Returns the working value as an unsigned number of at most four bytes; 0 if there is none.
     pub(super) fn number(&self, object: ObjectId) -> u32 {
         let mut wide = [0; 4];
         let bytes = self.bytes(object).unwrap_or_default();
@@ -163,7 +163,7 @@ impl Objects {
         u32::from_le_bytes(wide)
     }
 
-    /// The working value as a number of its type.
+    /// Returns the working value as a number of its type.
     pub(super) fn real(&self, object: ObjectId) -> Option<f64> {
         self.spec(object)?.data_type.decode(self.bytes(object)?).ok()?.as_f64()
     }
@@ -330,7 +330,7 @@ impl Spec {
         }
     }
 
-    /// An object of an EDS. The signatures for storing and restoring are those of CiA 301.
+    /// Creates the entry of an object in an EDS. The signatures for storing and restoring come from CiA 301.
     fn plain(entry: &Entry) -> Spec {
         let limit = |scalar: &Option<Scalar>| scalar.as_ref().and_then(Scalar::as_f64);
         let signature = match (entry.object.index, entry.object.sub) {
@@ -353,13 +353,13 @@ impl Spec {
         }
     }
 
-    /// The factory default; zeros or empty text if the description has none.
+    /// Returns the factory default; zeros or empty text if the description has none.
     fn factory_default(&self, node: NodeId) -> Vec<u8> {
         let described = self.default.as_ref().and_then(|default| default.encode(self.data_type, node).ok());
         described.unwrap_or_else(|| vec![0; self.data_type.width().unwrap_or(0)])
     }
 
-    /// The bytes of a value in the entry's type.
+    /// Encodes a value in the type of the entry.
     pub(super) fn encode(&self, value: &Scalar, node: NodeId) -> Result<Vec<u8>, String> {
         value.encode(self.data_type, node).map_err(|error| error.to_string())
     }

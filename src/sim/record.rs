@@ -61,7 +61,7 @@ impl Recorder {
     }
 }
 
-/// The line of one mapped value. `has_status`: the same PDO contains the status.
+/// Formats the line of one mapped value. `has_status`: the same PDO contains the status.
 pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], has_status: bool) -> Line {
     let status = match (reading.overload, has_status, reading.marker) {
         (Some(Direction::High), true, _) => "overload-high",
@@ -82,7 +82,7 @@ pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], has_status: bo
     Line(format!("{node},{},{value},{unit},{status},{}", reading.signal, raw(bytes)))
 }
 
-/// The line of a mapped object that is not a process value (a field value), with its address.
+/// Formats the line of a mapped object that is not a process value (a field value), with its address.
 pub(super) fn plain(node: NodeId, object: ObjectId, data_type: DataType, bytes: &[u8]) -> Line {
     let value = match data_type {
         DataType::Real32 | DataType::Real64 => real(bytes),
@@ -97,14 +97,14 @@ fn raw(bytes: &[u8]) -> String {
     format!("0x{digits}")
 }
 
-/// The two's complement number in `bytes`, the lowest byte first.
+/// Decodes the two's complement number in `bytes`, the lowest byte first.
 fn signed(bytes: &[u8]) -> i128 {
     let negative = bytes.last().is_some_and(|byte| byte & 0x80 != 0);
     let unsigned = bytes.iter().rev().fold(0i128, |number, byte| number * 256 + i128::from(*byte));
     if negative { unsigned - (0..bytes.len()).fold(1i128, |power, _| power * 256) } else { unsigned }
 }
 
-/// An integer with a decimal point before the last `digits`.
+/// Formats an integer with a decimal point before the last `digits`.
 fn decimal(number: i128, digits: u32) -> String {
     let mut text = number.unsigned_abs().to_string();
     let digits = usize::try_from(digits).unwrap_or(0);
@@ -120,7 +120,7 @@ fn decimal(number: i128, digits: u32) -> String {
     text
 }
 
-/// A REAL32 as the shortest text that parses to the same number.
+/// Formats a REAL32 as the shortest text that parses to the same number.
 fn real(bytes: &[u8]) -> String {
     let Ok(bytes) = bytes.try_into() else { return String::new() };
     let number = f32::from_le_bytes(bytes);

@@ -125,7 +125,8 @@ fn on_segment(mut value: Incoming, mut received: u8, frame: [u8; 8], longest: us
     Ok(Step::Continue(block, answers))
 }
 
-/// The end request of a value, in either direction; `unused` bytes of the last segment are not part of the value.
+/// Creates the end request of a value, in either direction. `unused` bytes of the last segment are not part of the
+/// value.
 fn end(value: &[u8], unused: usize, has_crc: bool) -> [u8; 8] {
     let [low, high] = if has_crc { crc(value).to_le_bytes() } else { [0, 0] };
     let [unused, ..] = unused.to_le_bytes();
@@ -165,7 +166,7 @@ fn send_block(value: Outgoing, start: usize, block_size: u8) -> Step {
     Step::Continue(Block::Sending { value, start, count }, frames)
 }
 
-/// The CRC: the remainder of the value, followed by 16 zero bits, divided by x^16 + x^12 + x^5 + 1.
+/// Computes the CRC: the remainder of the value, followed by 16 zero bits, divided by x^16 + x^12 + x^5 + 1.
 fn crc(value: &[u8]) -> u16 {
     let mut register = 0u16;
     for byte in value {

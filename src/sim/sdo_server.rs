@@ -19,10 +19,10 @@ const UPLOAD_COMMANDS: [u8; 5] = [0x43, 0x4f, 0x4b, 0x47, 0x43];
 
 /// The objects that the server reads and writes.
 pub(super) trait Dictionary {
-    /// The value of an entry in wire order.
+    /// Reads the value of an entry in wire order.
     fn upload(&mut self, object: ObjectId) -> Result<Vec<u8>, Abort>;
 
-    /// The width of a writable entry in bytes; `None` if its type has no fixed width.
+    /// Returns the width of a writable entry in bytes; `None` if its type has no fixed width.
     fn width(&self, object: ObjectId) -> Result<Option<usize>, Abort>;
 
     /// Writes a value.

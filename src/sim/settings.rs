@@ -121,7 +121,7 @@ impl Settings {
         rate.is_some()
     }
 
-    /// The bit rate of a code in the object.
+    /// Returns the bit rate of a code in the object.
     fn rate(&self, code: u8) -> Option<BitRate> {
         self.object_codes.iter().find(|(known, _)| *known == code).map(|(_, rate)| *rate)
     }

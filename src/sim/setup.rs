@@ -72,7 +72,7 @@ pub enum OfflineAfter {
 }
 
 impl Setup {
-    /// A device with the values of its description.
+    /// Creates a device with the values of its description.
     pub fn new(model: Arc<Model>, node: NodeId) -> Setup {
         let sim = SimData::of(&model);
         let channels = sim.channels.clone();

@@ -89,7 +89,7 @@ impl StateFile {
         Ok(StateFile { inner: Arc::new(Mutex::new(Inner { file, devices })) })
     }
 
-    /// The settings that a device has stored in an earlier run.
+    /// Returns the settings that a device has stored in an earlier run.
     pub(super) fn get(&self, kind: &str, serial: u32) -> Option<Stored> {
         self.inner.lock().ok()?.devices.get(&(kind.to_owned(), serial)).cloned()
     }

@@ -64,7 +64,7 @@ pub(super) enum Cause {
 }
 
 impl Tpdo {
-    /// All TPDOs in the object dictionary.
+    /// Returns all TPDOs in the object dictionary.
     pub(super) fn all(objects: &Objects, style: PdoStyle) -> Vec<Tpdo> {
         let numbers = (0..512).filter(|number| objects.has_index(0x1800 + number));
         numbers.map(|number| Tpdo::new(number, style)).collect()
@@ -102,7 +102,7 @@ impl Tpdo {
         matches!(self.kind(objects), 254 | 255)
     }
 
-    /// The COB-ID, if the TPDO is valid.
+    /// Returns the COB-ID, if the TPDO is valid.
     pub(super) fn cob_id(&self, objects: &Objects) -> Option<CanId> {
         let cob_id = objects.number(self.communication(1));
         let id = u16::try_from(cob_id & 0x7ff).ok()?;
@@ -115,7 +115,7 @@ impl Tpdo {
         !refuses && self.cob_id(objects) == Some(id)
     }
 
-    /// The present mapping.
+    /// Returns the present mapping.
     pub(super) fn mapping(&self, objects: &Objects) -> Vec<ObjectId> {
         let map = 0x1a00 + self.number;
         let count = u8::try_from(objects.number(ObjectId::new(map, 0))).unwrap_or(0);
@@ -127,7 +127,7 @@ impl Tpdo {
         index == 0x1800 + self.number || index == 0x1a00 + self.number
     }
 
-    /// Called when the node becomes OPERATIONAL, or when a parameter of the TPDO is written. Sends nothing.
+    /// Restarts the TPDO when the node becomes OPERATIONAL or when a parameter of the TPDO is written. Sends nothing.
     pub(super) fn start(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         *self = Tpdo::new(self.number, self.style);
         self.timer = self.event_timer(objects).map(|period| now + period);
@@ -153,7 +153,7 @@ impl Tpdo {
         }
     }
 
-    /// Called when the node leaves OPERATIONAL.
+    /// Stops the TPDO when the node leaves OPERATIONAL.
     pub(super) fn stop(&mut self) {
         *self = Tpdo::new(self.number, self.style);
     }

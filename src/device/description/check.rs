@@ -141,7 +141,7 @@ fn pdos(description: &Description, tables: &Tables<'_, '_>) {
     }
 }
 
-/// The number of the TPDO to which an index belongs, counted from 0.
+/// Returns the number of the TPDO to which an index belongs, counted from 0.
 fn tpdo_number(index: u16) -> Option<u16> {
     (0x1800..0x1c00).contains(&index).then_some(index & 0x1ff)
 }

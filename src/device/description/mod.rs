@@ -36,7 +36,7 @@ pub struct DescriptionError {
 }
 
 impl DescriptionError {
-    /// The mistake with its place: `x.toml:6:1: unknown key "signals" (known: …)`.
+    /// Formats the mistake with its place: `x.toml:6:1: unknown key "signals" (known: …)`.
     pub fn in_file(&self, file: &str) -> String {
         format!("{file}:{}: {}", self.place, self.message)
     }
@@ -96,7 +96,7 @@ pub struct Description {
 /// A deviation from the standard that the manual of a device states.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Deviation {
-    /// The case of `conform` that finds it: `SDO-07`.
+    /// The case of `conform` that finds the deviation: `SDO-07`.
     pub case: String,
     /// The objects with this deviation; empty for all objects.
     pub objects: Vec<ObjectId>,
@@ -221,13 +221,13 @@ pub struct Factory {
 /// How an SDO server behaves.
 #[derive(Clone, Debug, Default)]
 pub struct SdoStyle {
-    /// Whether it indicates sizes (43h, 4Bh …) or omits them (42h).
+    /// Whether the server indicates sizes (43h, 4Bh …) or omits them (42h).
     pub size: SizeIndication,
     /// Whether the server supports expedited transfers only. Its strings then have at most four characters.
     pub expedited_only: bool,
-    /// Whether it supports block transfer.
+    /// Whether the server supports block transfer.
     pub block: bool,
-    /// The abort codes that its manual lists; empty if it lists none.
+    /// The abort codes that the manual lists; empty if it lists none.
     pub aborts: Vec<u32>,
 }
 
@@ -344,7 +344,7 @@ impl EmergencyEntry {
         self.register.filter(|&register| register != 0)
     }
 
-    /// The channel in bytes 3 to 7 of an emergency, if one of them is described as the channel.
+    /// Returns the channel from bytes 3 to 7 of an emergency, if the description states which byte is the channel.
     pub fn channel(&self, bytes: [u8; 5]) -> Option<u8> {
         let mut meanings = self.bytes.iter().zip(bytes);
         meanings.find(|(meaning, _)| meaning.to_lowercase().contains("channel")).map(|(_, byte)| byte)
@@ -352,12 +352,12 @@ impl EmergencyEntry {
 }
 
 impl Description {
-    /// The entry that describes `object`.
+    /// Returns the entry that describes `object`.
     pub fn object(&self, object: ObjectId) -> Option<&ObjectEntry> {
         self.objects.iter().find(|entry| entry.at.contains(object))
     }
 
-    /// The meaning of an emergency code on this device.
+    /// Returns the meaning of an emergency code on this device.
     pub fn emergency(&self, code: u16) -> Option<&EmergencyEntry> {
         self.emergencies.iter().find(|entry| entry.code == code)
     }

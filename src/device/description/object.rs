@@ -18,11 +18,11 @@ pub struct ObjectEntry {
     pub data_type: DataType,
     /// Access by SDO.
     pub access: Access,
-    /// Factory default; it fits the type.
+    /// Factory default, checked to fit the type.
     pub default: Option<Scalar>,
-    /// Lowest value allowed; it fits the type.
+    /// Lowest value allowed, checked to fit the type.
     pub low: Option<Scalar>,
-    /// Highest value allowed; it fits the type.
+    /// Highest value allowed, checked to fit the type.
     pub high: Option<Scalar>,
     /// The allowed values and ranges, if `low` and `high` cannot express them.
     pub allow: Vec<NumberRange>,
@@ -33,7 +33,7 @@ pub struct ObjectEntry {
     /// Objects that must all be 0 before this object accepts a number other than 0. On some devices heartbeat and node
     /// guarding exclude each other in this way.
     pub only_if_zero: Vec<ObjectId>,
-    /// Whether a TPDO can contain it.
+    /// Whether a TPDO can contain the object.
     pub pdo: bool,
     /// Unit of the number if it is fixed: `ms`, `100us`.
     pub unit: Option<String>,
@@ -57,7 +57,7 @@ impl ObjectEntry {
         self.at.objects()
     }
 
-    /// The meaning of a number in this object, if the description gives one.
+    /// Returns the meaning of a number in this object, if the description gives one.
     pub fn meaning(&self, number: u64) -> Option<&str> {
         self.values.get(&number).map(String::as_str)
     }

@@ -110,13 +110,13 @@ impl<'t> Table<'t> {
         self.source.note(offset, message);
     }
 
-    /// The value of a key; `None` if it is missing or wrong.
+    /// Reads the value of a key; `None` if it is missing or wrong.
     pub(super) fn optional<T: FromToml>(&mut self, key: &'static str) -> Option<T> {
         let value = self.value(key)?;
         self.read(key, value)
     }
 
-    /// The value of a required key.
+    /// Reads the value of a required key.
     pub(super) fn required<T: FromToml>(&mut self, key: &'static str) -> Option<T> {
         let Some(value) = self.value(key) else {
             self.missing.push(key);
@@ -125,7 +125,7 @@ impl<'t> Table<'t> {
         self.read(key, value)
     }
 
-    /// The value of a key, or the default of its type.
+    /// Reads the value of a key, or returns the default of its type.
     pub(super) fn or_default<T: FromToml + Default>(&mut self, key: &'static str) -> T {
         self.optional(key).unwrap_or_default()
     }
@@ -155,13 +155,13 @@ impl<'t> Table<'t> {
         entries
     }
 
-    /// A table below this one.
+    /// Reads a table below this one.
     pub(super) fn table(&mut self, key: &'static str) -> Option<Table<'t>> {
         let value = self.value(key)?;
         self.as_table(key, value)
     }
 
-    /// An array of tables below this one.
+    /// Reads an array of tables below this one.
     pub(super) fn tables(&mut self, key: &'static str) -> Vec<Table<'t>> {
         let Some(value) = self.value(key) else { return Vec::new() };
         match value.get_ref() {

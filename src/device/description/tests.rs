@@ -2,7 +2,7 @@ use super::*;
 
 const HEAD: &str = "name = \"x\"\ntitle = \"X\"\nvendor = \"V\"\n";
 
-/// The mistakes of a description that begins with [`HEAD`], which has three lines.
+/// Returns the mistakes of a description that begins with [`HEAD`], which has three lines.
 fn mistakes(text: &str) -> Vec<String> {
     match read(&format!("{HEAD}{text}")) {
         Ok(_) => Vec::new(),

@@ -28,7 +28,7 @@ pub(super) struct Content {
 }
 
 impl Content {
-    /// Sub-index 0 of an array or record, if it has no section. The type is that of CiA 301.
+    /// Creates sub-index 0 of an array or record, if it has no section. The type comes from CiA 301.
     pub(super) fn count(highest: Option<u8>) -> Content {
         Content {
             data_type: DataType::Unsigned(1),
@@ -43,7 +43,7 @@ impl Content {
         }
     }
 
-    /// An unsigned setting with this number of bytes.
+    /// Creates an unsigned setting with this number of bytes.
     pub(super) fn setting(bytes: u8, default: Option<Scalar>) -> Content {
         let data_type = DataType::Unsigned(bytes);
         Content { data_type, access: Access::Rw, default, ..Content::count(None) }
@@ -169,15 +169,15 @@ impl Reader<'_> {
         }
     }
 
-    /// A type that the file itself defines: CANFestival's editor writes `[A0]`, and the base type as the default of
-    /// `[A0sub1]`.
+    /// Finds a type that the file itself defines: CANFestival's editor writes `[A0]`, and the base type as the default
+    /// of `[A0sub1]`.
     fn defined_type(&self, code: u16) -> Option<DataType> {
         let section =
             self.ini.section(&format!("{code:x}sub1")).or_else(|| self.ini.section(&format!("{code:04x}sub1")))?;
         DataType::from_code(u16::try_from(number(section, "defaultvalue")?).ok()?)
     }
 
-    /// The access type. If it is missing or unknown, reading and writing are allowed.
+    /// Reads the access type. If it is missing or unknown, reading and writing are allowed.
     fn access(&mut self, section: &Section) -> Access {
         let item = section.get("accesstype");
         if let Some(access) = item.and_then(|item| value::access(&item.value)) {
@@ -191,7 +191,7 @@ impl Reader<'_> {
         Access::Rw
     }
 
-    /// An integer, with a warning if it is doubtful.
+    /// Reads an integer, and warns if it is doubtful.
     pub(super) fn integer(&mut self, section: &Section, key: &str) -> Option<i128> {
         self.checked(section, key, value::integer)
     }

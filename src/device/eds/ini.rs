@@ -32,7 +32,7 @@ pub(super) struct Section {
 }
 
 impl Section {
-    /// The value of a key; `None` if it is missing or empty. `key` must be in lower case and without blanks.
+    /// Returns the value of a key; `None` if it is missing or empty. `key` must be in lower case and without blanks.
     pub(super) fn get(&self, key: &str) -> Option<&Item> {
         self.items.get(key).filter(|item| !item.value.is_empty())
     }
@@ -130,13 +130,13 @@ impl Ini {
         (at, false)
     }
 
-    /// The section with this name. `name` must be in lower case and without blanks.
+    /// Returns the section with this name. `name` must be in lower case and without blanks.
     pub(super) fn section(&self, name: &str) -> Option<&Section> {
         self.sections.get(*self.places.get(name)?)
     }
 }
 
-/// The form of a name that is compared: lower case, without blanks.
+/// Returns the form of a name that is compared: lower case, without blanks.
 pub(super) fn fold(name: &str) -> String {
     name.chars().filter(|character| !character.is_whitespace()).flat_map(char::to_lowercase).collect()
 }

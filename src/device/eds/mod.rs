@@ -176,7 +176,7 @@ pub fn read(bytes: &[u8]) -> Result<Eds, EdsError> {
     })
 }
 
-/// The index of the object in the name of its section: `1018`, `1018sub1`, `1018Name`.
+/// Returns the index of the object in the name of its section: `1018`, `1018sub1`, `1018Name`.
 fn section_index(name: &str) -> Option<u16> {
     let name = name.strip_prefix("0x").unwrap_or(name);
     let digits = name.get(..4)?;
@@ -214,7 +214,7 @@ fn no_section(text: &str) -> EdsError {
 }
 
 impl Eds {
-    /// The value for the device: the parameter value of a DCF, else the default.
+    /// Returns the value for the device: the parameter value of a DCF, else the default.
     pub fn value(&self, object: ObjectId) -> Option<&Scalar> {
         let default = || self.dictionary.get(object)?.default.as_ref();
         self.parameter_values.get(&object).or_else(default)

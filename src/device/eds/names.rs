@@ -108,12 +108,12 @@ fn count<'a>(names: impl Iterator<Item = &'a str>) -> HashMap<String, u32> {
     counts
 }
 
-/// Whether a name is free for one sub-object: it is not empty, no object has it, and it is not an index.
+/// Whether a sub-object can have this name: it is not empty, no object has it, and it does not read as an address.
 fn is_free(name: &str, taken: &HashSet<String>) -> bool {
     !name.is_empty() && !taken.contains(name) && !ObjectId::reads_as_address(name)
 }
 
-/// A unique name for every object: its own name, with the index appended if necessary.
+/// Returns a unique name for every object: its own name, with the index appended if necessary.
 fn object_names(slugs: &BTreeMap<u16, String>) -> BTreeMap<u16, String> {
     let counts = count(slugs.values().map(String::as_str));
     let mut names = BTreeMap::new();
@@ -136,7 +136,7 @@ fn nameless(index: u16) -> String {
     format!("object-{index:04x}")
 }
 
-/// A name of a file in lower case with hyphens.
+/// Converts a name of a file to lower case with hyphens.
 pub(in crate::device) fn slug(name: &str) -> String {
     let mut slug = String::new();
     let mut gap = false;

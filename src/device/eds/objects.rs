@@ -119,7 +119,7 @@ impl Reader<'_> {
         self.objects.names.insert(index, name.map_or_else(String::new, |item| item.value.clone()));
     }
 
-    /// The number of elements in `CompactSubObj`, if it is given.
+    /// Reads the number of elements from `CompactSubObj`, if it is given.
     fn elements(&mut self, main: &Section) -> Option<u8> {
         let item = main.get("compactsubobj")?;
         match self.integer(main, "CompactSubObj").and_then(|number| u8::try_from(number).ok()) {

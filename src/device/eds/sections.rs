@@ -42,7 +42,7 @@ enum Role {
     Other,
 }
 
-/// The objects of a file with their sections; unlisted objects are included.
+/// Finds the objects of a file with their sections; unlisted objects are included.
 pub(super) fn objects<'a>(ini: &'a Ini, warnings: &mut Vec<Warning>) -> BTreeMap<u16, Parts<'a>> {
     let mut objects: BTreeMap<u16, Parts> = BTreeMap::new();
     for section in &ini.sections {

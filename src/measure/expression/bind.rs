@@ -44,7 +44,7 @@ pub struct AvailableSignals<'a> {
 }
 
 impl<'a> AvailableSignals<'a> {
-    /// All signals of these nodes, and all objects by address.
+    /// Collects all signals of these nodes, and all objects by address.
     pub fn from_layouts(layouts: impl IntoIterator<Item = Layout<'a>>) -> AvailableSignals<'a> {
         let mut available = AvailableSignals::default();
         for layout in layouts {
@@ -68,7 +68,8 @@ impl<'a> AvailableSignals<'a> {
         self.objects.entry((node, name.to_lowercase())).or_insert(signal);
     }
 
-    /// Adds the parts of signals, and every named object of the description or EDS, also with its EDS name.
+    /// Adds the parts of signals (`pressure.net`), and every named object of the description or EDS, also by its EDS
+    /// name.
     fn add_objects(&mut self, layout: Layout<'_>) {
         for (signal, (part, low)) in layout.signals.iter().flat_map(|signal| PARTS.map(|part| (signal, part))) {
             let (node, name) = (layout.node, format!("{}.{part}", signal.name));
@@ -86,7 +87,7 @@ impl<'a> AvailableSignals<'a> {
         }
     }
 
-    /// The signals of a recording.
+    /// Collects the signals of a recording.
     pub fn from_sources(sources: &[Source]) -> AvailableSignals<'a> {
         let entry = |source: &Source| AvailableSignal {
             node: source.node,
@@ -127,7 +128,7 @@ impl<'a> AvailableSignals<'a> {
         expression.signals().iter().all(|signal| self.find(signal.node.unwrap_or(node), signal).is_some())
     }
 
-    /// The names of a node's signals, the most similar to `name` first.
+    /// Returns the names of a node's signals, the most similar to `name` first.
     fn nearest(&self, node: NodeId, name: &str) -> Vec<&str> {
         let mut names: Vec<&str> =
             self.signals.iter().filter(|signal| signal.node == node).map(|signal| signal.name.as_str()).collect();
@@ -141,7 +142,7 @@ impl<'a> AvailableSignals<'a> {
     }
 }
 
-/// The unit of a recorded signal, if known.
+/// Returns the unit of a recorded signal, if known.
 pub(super) fn unit_of(source: &Source) -> Option<Unit> {
     Unit::from_symbol(&source.unit).filter(|_| !source.unit.is_empty())
 }
@@ -301,7 +302,7 @@ impl Binder<'_> {
         }
     }
 
-    /// Adds a measured quantity to those that the verdict shows. Returns its formula.
+    /// Adds a measured quantity to the values that the verdict shows. Returns the formula of the quantity.
     fn show(&mut self, side: Typed) -> Formula {
         let unit = match side.dimension {
             Dimension::In(unit, _) => Some(unit),
@@ -403,7 +404,7 @@ impl Binder<'_> {
 const SECOND: Unit = Unit(0x0003_0000);
 const HERTZ: Unit = Unit(0x0020_0000);
 
-/// The unit of a function of all samples.
+/// Returns the unit of a function of all samples.
 fn aggregate_dimension(function: Function, argument: Dimension) -> Dimension {
     match (function, argument) {
         (Function::Rate, _) => Dimension::In(HERTZ, Offsets::Known(0.0)),
@@ -418,7 +419,7 @@ fn aggregate_dimension(function: Function, argument: Dimension) -> Dimension {
 mod tests {
     use super::*;
 
-    /// The numbers of an expression that take the unit of the device.
+    /// Returns the numbers of an expression that take the unit of the device.
     fn bare(text: &str, unit: &str) -> Vec<String> {
         let node = NodeId::new(5).expect("a node-ID");
         let available = AvailableSignals::from_sources(&[Source { node, signal: "p".into(), unit: unit.into() }]);

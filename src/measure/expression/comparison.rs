@@ -268,7 +268,7 @@ impl Comparison {
         }
     }
 
-    /// The present value of each function.
+    /// Returns the present value of each function.
     fn aggregate_values(&self, signals: &SharedSignals) -> Vec<Option<f64>> {
         let value_of = |(aggregate, figures): (&Aggregate, &Figures)| value(aggregate.function, figures.get(signals));
         self.bound.aggregates.iter().zip(&self.aggregates).map(value_of).collect()
@@ -279,7 +279,7 @@ impl Comparison {
         self.evaluated.iter().map(|&(evaluated, _)| evaluated).chain(aggregates).max().unwrap_or(0)
     }
 
-    /// The number of samples without a valid value. Samples inside `invalid()` do not count.
+    /// Returns the number of samples without a valid value. Samples inside `invalid()` do not count.
     fn invalid(&self, signals: &SharedSignals) -> u64 {
         let is_counted = |aggregate: &Aggregate| aggregate.function != Function::Invalid;
         let aggregates =
@@ -288,7 +288,7 @@ impl Comparison {
         self.evaluated.iter().map(|&(_, invalid)| invalid).chain(aggregates).max().unwrap_or(0)
     }
 
-    /// The verdict. `end` is the end of the recording: a signal that stopped earlier has no verdict.
+    /// Returns the verdict. `end` is the end of the recording: a signal that stopped earlier has no verdict.
     pub(super) fn verdict(&self, signals: &SharedSignals, end: Option<Mono>, missing: &[MissingData]) -> Verdict {
         let aggregates = self.aggregate_values(signals);
         let (outcome, reason) = self.outcome((&aggregates, signals), end, missing);
@@ -355,7 +355,7 @@ impl Comparison {
         LiveResult { text: self.bound.text.clone(), node: self.bound.node, is_satisfied, values }
     }
 
-    /// The quantities with their latest values, or with mean and range if `latest` is false.
+    /// Returns the quantities with their latest values, or with mean and range if `latest` is false.
     fn quantities(&self, (aggregates, signals): (&[Option<f64>], &SharedSignals), latest: bool) -> Vec<QuantityValue> {
         let quantity = |(shown, figures): (&ShownQuantity, &Figures)| {
             let statistics = figures.get(signals);
@@ -404,7 +404,7 @@ impl Comparison {
     }
 }
 
-/// The present value of a function.
+/// Returns the present value of a function.
 fn value(function: Function, statistics: &Statistics) -> Option<f64> {
     match function {
         Function::Mean => statistics.mean(),

@@ -113,7 +113,7 @@ fn ambiguous(first: &Typed, second: &Typed, from: Unit, to: Unit) -> LocatedErro
     LocatedError::new(literal.at, message).hint(format!("write it in {unit}"))
 }
 
-/// A number without a unit, and the unit of the device that it takes.
+/// A number without a unit, and the unit of the device that is used for it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LimitWithoutUnit {
     /// The number as in the expression.
@@ -122,7 +122,7 @@ pub struct LimitWithoutUnit {
     pub unit: Unit,
 }
 
-/// The number or the range (`9..11`) among `sides` that takes the unit of the device, because no side states a unit.
+/// Finds the number or range (`9..11`) in `sides` that takes the unit of the device, because no side states a unit.
 pub(super) fn limit_without_unit(sides: &[&Typed]) -> Option<LimitWithoutUnit> {
     let unit = sides.iter().find_map(|side| side.measured_unit())?;
     let bare = sides.iter().filter(|side| side.dimension == Dimension::Literal);
@@ -208,7 +208,7 @@ fn convert_term(term: Typed, to: &Typed) -> Result<Typed, LocatedError> {
     term.converted(to)
 }
 
-/// The unit of a sum. Both terms have the same unit.
+/// Returns the unit of a sum. Both terms have the same unit.
 fn sum(first: Dimension, operator: Operator, second: Dimension) -> Dimension {
     match (first, second) {
         (Dimension::In(unit, first), Dimension::In(_, second)) => Dimension::In(
@@ -238,7 +238,7 @@ fn sum(first: Dimension, operator: Operator, second: Dimension) -> Dimension {
     }
 }
 
-/// The unit of a product or a quotient.
+/// Returns the unit of a product or a quotient.
 fn product(first: &Typed, operator: Operator, second: &Typed, at: Position) -> Result<Dimension, LocatedError> {
     let is_division = operator == Operator::Divide;
     let scaled = |unit: Unit, offsets: Offsets, by: &Typed| {
@@ -271,7 +271,7 @@ fn product(first: &Typed, operator: Operator, second: &Typed, at: Position) -> R
     })
 }
 
-/// The unit of an absolute value. The absolute value of a temperature cannot be converted.
+/// Returns the unit of an absolute value. The absolute value of a temperature cannot be converted.
 pub(super) fn absolute(dimension: Dimension) -> Dimension {
     match dimension {
         Dimension::In(unit, Offsets::Known(offsets)) if offsets != 0.0 => Dimension::In(unit, Offsets::Unknown),
@@ -279,7 +279,7 @@ pub(super) fn absolute(dimension: Dimension) -> Dimension {
     }
 }
 
-/// The unit of a negated value.
+/// Returns the unit of a negated value.
 pub(super) fn negative(dimension: Dimension) -> Dimension {
     match dimension {
         Dimension::In(unit, Offsets::Known(offsets)) => Dimension::In(unit, Offsets::Known(-offsets)),

@@ -49,7 +49,7 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// An evaluator without signals. A repeated expression has one verdict.
+    /// Creates an evaluator without signals. A repeated expression has one verdict.
     pub fn new(all: &[Expression]) -> Evaluator {
         let mut expressions: Vec<Expression> = Vec::new();
         for expression in all {
@@ -155,7 +155,7 @@ impl Evaluator {
         limits
     }
 
-    /// The signals of a node to measure, without repetitions.
+    /// Returns the signals of a node to measure, without repetitions.
     pub fn wanted_of(&self, node: NodeId) -> Vec<Wanted> {
         let mut wanted = Vec::new();
         for input in self.bound().flat_map(|bound| &bound.inputs).filter(|input| input.node == node) {
@@ -225,7 +225,7 @@ impl Evaluator {
     }
 }
 
-/// The value as printed. For example, a REAL32 value printed as 9.95 is compared as 9.95.
+/// Returns the value as printed. For example, a REAL32 value printed as 9.95 is compared as 9.95.
 fn printed_value(number: Number) -> f64 {
     match number {
         Number::Real32(_) => number.to_string().parse().unwrap_or_else(|_| number.as_f64()),

@@ -30,7 +30,7 @@ pub(super) enum Formula {
 }
 
 impl Formula {
-    /// The value. `None` if a value is missing or the result is not finite.
+    /// Calculates the value. `None` if a value is missing or the result is not finite.
     pub(super) fn value(&self, values: Values<'_>) -> Option<f64> {
         let value = match self {
             Formula::Number(number) => *number,

@@ -184,13 +184,13 @@ fn number_or_signal(text: &str, at: Position) -> Result<(Token, usize), LocatedE
     Ok((Token::Number(number), length))
 }
 
-/// The index of an object without sub-index: `0x2100`. Lower numbers are the indices of data types.
+/// Parses the index of an object without sub-index: `0x2100`. Lower numbers are the indices of data types.
 fn index(word: &str) -> Option<u16> {
     let digits = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X")).filter(|digits| digits.len() == 4)?;
     u16::from_str_radix(digits, 16).ok().filter(|index| *index >= 0x1000)
 }
 
-/// The type after an object, and the length of its text: `/i16`. Any other text after the slash is a divisor.
+/// Parses the type after an object: `/i16`. Also returns its length. Any other text after the slash is a divisor.
 fn stated_type(text: &str) -> (Option<DataType>, usize) {
     let Some(word) = text.strip_prefix('/').map(alphanumeric) else { return (None, 0) };
     match word.parse().ok().filter(|data_type: &DataType| data_type.is_number()) {
@@ -201,7 +201,7 @@ fn stated_type(text: &str) -> (Option<DataType>, usize) {
     }
 }
 
-/// The letters and digits at the start of a text.
+/// Returns the letters and digits at the start of a text.
 fn alphanumeric(text: &str) -> &str {
     text.find(|character: char| !character.is_ascii_alphanumeric()).map_or(text, |end| &text[..end])
 }
@@ -222,7 +222,7 @@ fn is_exponent(word: &str) -> bool {
     word.len() == digits.len() + 1 && !digits.is_empty() && digits.bytes().all(|digit| digit.is_ascii_digit())
 }
 
-/// The length of the decimal number at the start of a text: `9`, `9.95`, `1.25e-3`. In `9..10` it is 1.
+/// Returns the length of the decimal number at the start of a text: `9`, `9.95`, `1.25e-3`. In `9..10` it is 1.
 fn decimal_length(text: &str) -> usize {
     let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
     let mut length = digits(0);

@@ -108,7 +108,7 @@ impl Expression {
         functions.into_iter().find(|function| function.needs_many_samples())
     }
 
-    /// An error at a position of this text.
+    /// Creates an error at a position of this text.
     fn error(&self, at: Position, message: impl Into<String>) -> ExpressionError {
         LocatedError::new(at, message).in_text(&self.text)
     }

@@ -70,7 +70,7 @@ pub(super) fn parse(text: &str) -> Result<Condition, LocatedError> {
     }
 }
 
-/// A token as it is shown in an error.
+/// Formats a token for an error.
 fn spelling(token: &Token) -> String {
     match token {
         Token::Number(number) => number.to_string(),

@@ -68,7 +68,7 @@ impl SharedSignals {
         SeriesId { signal, series }
     }
 
-    /// The statistics of a formula.
+    /// Returns the statistics of a formula.
     pub(super) fn statistics(&self, id: SeriesId) -> &Statistics {
         &self.0[id.signal].series[id.series].statistics
     }

@@ -139,7 +139,7 @@ fn measured() -> impl Strategy<Value = Quantity> {
     })
 }
 
-/// A quantity that contains a signal.
+/// Generates a quantity that contains a signal.
 fn quantity(aggregate: bool) -> impl Strategy<Value = Quantity> {
     (measured(), signal(), proptest::sample::select(Function::ALL.to_vec())).prop_map(
         move |(inner, signal, function)| {
@@ -205,7 +205,7 @@ proptest! {
     }
 }
 
-/// A printed expression parses to the same tree. An error has a position inside the text or at its end.
+/// Checks that a printed expression parses to the same tree, and that an error has a position in the text.
 fn check_parse(text: &str) -> Result<(), TestCaseError> {
     match Expression::parse(text) {
         Ok(expression) => {
@@ -246,7 +246,7 @@ fn sample(at_ms: u64, source: usize, value: Option<f64>) -> Sample {
     Sample { at, source, value: value.map(Number::Real64), status, raw: Raw::new(&[]), doubt: None }
 }
 
-/// The verdict on these values. NaN is an invalid value.
+/// Returns the verdict on these values. NaN is an invalid value.
 fn verdict(text: &str, signals: &[Signal<'_>]) -> Verdict {
     let mut evaluator = bound(text, signals).unwrap_or_else(|error| panic!("{text}: {error}"));
     let longest = signals.iter().map(|(.., values)| values.len()).max().unwrap_or(0);

@@ -102,7 +102,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// A verdict without data.
+    /// Creates a verdict without data.
     pub fn no_data(text: &str, node: Option<NodeId>, reason: Reason) -> Verdict {
         Verdict {
             text: text.to_owned(),
@@ -125,7 +125,7 @@ pub struct MissingData {
     pub node: NodeId,
     /// The signal as in [`Source`](crate::measure::sample::Source). `None`: all signals of the node.
     pub signal: Option<String>,
-    /// Why it is missing.
+    /// The reason why no data was received.
     pub reason: Reason,
 }
 

@@ -9,7 +9,7 @@ use crate::node::read::{Item, Reader};
 /// The number of TPDOs read from a device without a description. Four are not enough: a JUMO probe sends TPDO5.
 const UNDESCRIBED_TPDOS: u16 = 8;
 
-/// The TPDOs that the description lists. Without a description, or if it lists none, the first TPDOs.
+/// Returns the TPDOs that the description lists. Without a description, or if it lists none, the first TPDOs.
 fn tpdo_numbers(node: &Node) -> Vec<TpdoNumber> {
     let is_described = |number: &TpdoNumber| {
         node.model.as_ref().is_some_and(|model| model.dictionary.has_index(number.communication(0).index))

@@ -176,7 +176,7 @@ impl Block {
     }
 }
 
-/// The size that a request or answer announces.
+/// Parses the size that a request or answer announces.
 fn size(command: u8, data: &[u8]) -> Option<u32> {
     match data {
         [_, _, _, _, a, b, c, d, ..] if command & 0x02 != 0 => Some(u32::from_le_bytes([*a, *b, *c, *d])),

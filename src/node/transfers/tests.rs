@@ -12,7 +12,7 @@ fn received(frame: Frame, milliseconds: u64) -> Received {
     Received { frame, at: Stamp { mono: Mono::at(Duration::from_millis(milliseconds)), ..Stamp::default() } }
 }
 
-/// The transfers in these frames, one per millisecond, with the texts of the stray frames.
+/// Assembles the transfers in these frames, one per millisecond. Also returns the texts of the stray frames.
 fn assembled(frames: &[&str]) -> (Vec<Transfer>, Vec<String>) {
     let (mut transfers, mut strays, mut finished) = (Transfers::default(), Vec::new(), Vec::new());
     for (at, text) in (0..).zip(frames) {
@@ -113,7 +113,7 @@ fn second_master_disturbs_a_transfer() {
     assert!(disturbed(&[answered[0], answered[2], answered[1], answered[3]]));
 }
 
-/// The frames of a block read by our own client from a server that sends `data` in blocks of `size` segments.
+/// Returns the frames of a block read by our own client from a server that sends `data` in blocks of `size` segments.
 fn block_read(data: &[u8], repeat: bool) -> Vec<Frame> {
     let object = ObjectId::new(0x2002, 0);
     let (mut upload, mut frames) = (BlockUpload::new(node(), object, 0, false), Vec::new());
@@ -180,7 +180,7 @@ fn block_transfers_of_every_length() {
     }
 }
 
-/// The frames of a block write by our own client to a server with blocks of 5 segments.
+/// Returns the frames of a block write by our own client to a server with blocks of 5 segments.
 fn block_write(data: &[u8]) -> Vec<Frame> {
     let object = ObjectId::new(0x2002, 0);
     let mut download = BlockDownload::new(node(), object, data.to_vec(), DownloadSize::Indicated);

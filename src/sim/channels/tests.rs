@@ -9,7 +9,7 @@ fn id(text: &str) -> ObjectId {
 
 const AT: Duration = Duration::from_millis(500);
 
-/// A device whose channels are constant at `base` in their own units.
+/// Creates a device whose channels are constant at `base` in their own units.
 fn still(name: &str, base: f64, overloads: &[(u8, Overload)]) -> (Objects, Channels) {
     let mut setup = Setup::new(catalog::by_name(name).expect("built in"), NodeId::new(5).expect("a node-ID"));
     for channel in &mut setup.channels {

@@ -27,7 +27,7 @@ fn ms(milliseconds: u64) -> Mono {
     Mono::at(Duration::from_millis(milliseconds))
 }
 
-/// A built-in device whose channels are constant at `base`.
+/// Creates a built-in device whose channels are constant at `base`.
 fn constant(kind: &str, node_id: u8, base: f64) -> Setup {
     let mut setup = Setup::new(catalog::by_name(kind).expect("built in"), node(node_id));
     for channel in &mut setup.channels {

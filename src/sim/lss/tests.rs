@@ -27,7 +27,7 @@ impl TestBed {
         self.slave.request(bytes, self.identity, &mut self.settings)
     }
 
-    /// Requests and their answers, without trailing zeros; `-` means no answer.
+    /// Sends requests and checks their answers, without trailing zeros; `-` means no answer.
     fn play(&mut self, lines: &[(&str, &str)]) {
         for (request, expected) in lines {
             let reply = self.ask(request);
@@ -138,7 +138,7 @@ fn identification_by_range() {
     ask(&mut bed, 0, 20002, "4F");
 }
 
-/// The search of CiA 305: the upper bits of each part, then the complete part with the number of the next part.
+/// Searches as in CiA 305: the upper bits of each part, then the complete part with the number of the next part.
 fn fastscan(bed: &mut TestBed) -> Identity {
     let mut found = [0; 4];
     bed.play(&[("5100000000800000", "4F")]);

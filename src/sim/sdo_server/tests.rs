@@ -43,7 +43,7 @@ fn memory() -> Memory {
     ]))
 }
 
-/// Requests and their answers; `-` means no answer; several answers are separated by blanks.
+/// Sends requests and checks their answers; `-` means no answer; several answers are separated by blanks.
 fn transcript(server: &mut SdoServer, memory: &mut Memory, lines: &[(&str, &str)]) {
     for (request, answer) in lines {
         let bytes: [u8; 8] = parse_hex(request).expect("bytes").try_into().expect("eight");

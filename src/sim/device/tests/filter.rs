@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// The values of channel 1 in the TPDOs on `count` SYNCs, one every 100 ms.
+/// Returns the values of channel 1 in the TPDOs after `count` SYNCs, one every 100 ms.
 fn on_sync(bus: &mut MemoryBus, id: &str, count: usize) -> Vec<i16> {
     let mut values = Vec::new();
     for _ in 0..count {
@@ -20,7 +20,7 @@ fn spread(values: &[i16]) -> i16 {
     values.iter().max().expect("values") - values.iter().min().expect("values")
 }
 
-/// An MC1609 whose channel 1 is at 500.0 degC with a noise of 50.0 K.
+/// Creates an MC1609 whose channel 1 is at 500.0 degC with a noise of 50.0 K.
 fn mc1609(set: &[(&str, i64)]) -> MemoryBus {
     let mut setup = constant("mc1609", 5, 500.0);
     setup.channels[0].noise = 50.0;

@@ -239,7 +239,7 @@ fn a_change_by_delta_sends() {
     }
 }
 
-/// The REAL32 in the first four bytes.
+/// Returns the REAL32 in the first four bytes.
 fn pressure(frame: &str) -> f32 {
     let frame: Frame = frame.parse().expect("a frame");
     f32::from_le_bytes(frame.data()[..4].try_into().expect("four bytes"))
