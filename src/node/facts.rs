@@ -114,7 +114,7 @@ impl Node {
         self.model.as_ref()?.description.object(object)?.unit.as_deref().and_then(Unit::from_symbol)
     }
 
-    /// The facts for decoding.
+    /// The facts that decoding needs.
     pub fn layout(&self) -> Layout<'_> {
         Layout {
             node: self.id,

@@ -127,7 +127,7 @@ pub(crate) fn scaling_objects(node: &Node) -> Vec<ObjectId> {
     node.signals.iter().flat_map(of_signal).flatten().collect()
 }
 
-/// The objects with unit and digits of a signal. A description can name others than 6131h and 6132h of the channel.
+/// The objects with unit and digits of a signal. A description can name other objects than 6131h and 6132h.
 pub(crate) fn unit_and_digits(node: &Node, signal: &Signal) -> [Option<ObjectId>; 2] {
     let of_channel = signal.has_channel().then(|| ObjectId::new(0x6132, signal.channel));
     let digits = entry(node, signal).and_then(|entry| entry.digits).or(of_channel);

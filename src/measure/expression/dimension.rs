@@ -68,7 +68,7 @@ impl Typed {
         }
     }
 
-    /// Text for errors: `p is in bar` or `p has no unit`.
+    /// Formats the unit for errors: `p is in bar` or `p has no unit`.
     fn describe_unit(&self) -> String {
         match self.dimension {
             Dimension::In(unit, _) => format!("{} is in {unit}", self.name),

@@ -99,7 +99,7 @@ impl Formula {
         }
     }
 
-    /// The value of a formula without inputs.
+    /// Calculates the value of a formula without inputs.
     pub(super) fn constant(&self) -> Option<f64> {
         self.value(Values { inputs: &[], aggregates: &[] })
     }

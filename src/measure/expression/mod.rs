@@ -101,7 +101,7 @@ impl Expression {
         names.filter(|name| FIGURES.iter().any(|prefix| name.starts_with(prefix))).collect()
     }
 
-    /// The first function that needs more than one sample, for example `noise` or `rate`.
+    /// Returns the first function that needs more than one sample, for example `noise` or `rate`.
     pub fn needs_many_samples(&self) -> Option<tree::Function> {
         let mut functions = Vec::new();
         self.parts.iter().for_each(|part| part.functions(&mut functions));
