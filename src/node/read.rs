@@ -23,7 +23,7 @@ pub fn read_values<A: ObjectReader>(master: &mut A, items: &[Item]) -> Result<Ve
     Ok(values.collect())
 }
 
-/// After more consecutive reads without an answer, a node is treated as silent, even if it answers other objects.
+/// If more consecutive reads get no answer, a node is treated as silent, even if it answers other objects.
 const MAX_SILENT: u32 = 8;
 
 /// Reads objects that a device may not have, or may not answer. An object without a valid answer does not affect the

@@ -53,7 +53,8 @@ fn node_id(section: &Section, warnings: &mut Vec<Warning>) -> Option<NodeId> {
     node
 }
 
-/// Returns the bit rate in bit/s. The file has kbit/s, but some tools write bit/s; these numbers are above 1000.
+/// Returns the bit rate in bit/s. The unit in the file is kbit/s; numbers above 1000 are bit/s, as some tools write
+/// them.
 fn bit_rate(section: &Section, warnings: &mut Vec<Warning>) -> Option<u32> {
     let number = number(section, "Baudrate", warnings)?;
     if number <= 1000 {
