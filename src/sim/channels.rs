@@ -65,7 +65,7 @@ struct Channel {
     quantity: Quantity,
     filter: Filter,
     /// The lowest and highest value so far.
-    extremes: Option<(f64, f64)>,
+    seen: Option<(f64, f64)>,
     /// Other objects in the unit of the channel.
     follows: Vec<(ObjectId, Kind)>,
     /// Their numbers at the last change of the unit.
@@ -217,10 +217,7 @@ impl Channels {
 
     /// Resets minimum and maximum.
     pub(super) fn reset_extremes(&mut self, number: u8) {
-        self.list
-            .iter_mut()
-            .filter(|channel| channel.signal.channel == number)
-            .for_each(|channel| channel.extremes = None);
+        self.list.iter_mut().filter(|channel| channel.signal.channel == number).for_each(|channel| channel.seen = None);
     }
 
     /// Whether an object contains the unit of a channel.
@@ -258,7 +255,7 @@ impl Channels {
     /// changes the integers of all limits.
     pub(super) fn share(&self, objects: &mut Objects, written: ObjectId) {
         for channel in &self.list {
-            let is_in_unit = channel.objects_in_unit.iter().any(|(object, _)| *object == written);
+            let is_in_unit = channel.follows.iter().any(|(object, _)| *object == written);
             if let Some(value) = channel.pv(objects, written).filter(|_| is_in_unit) {
                 channel.put_pv(objects, real_form(written), value);
             }
@@ -357,9 +354,9 @@ impl Channel {
 
     fn read(&mut self, objects: &Objects, content: ObjectContent, data_type: DataType, time: Duration) -> Vec<u8> {
         let raw = self.filtered(time);
-        let (low, high) = self.extremes.unwrap_or((raw, raw));
+        let (low, high) = self.seen.unwrap_or((raw, raw));
         let (low, high) = (low.min(raw), high.max(raw));
-        self.extremes = Some((low, high));
+        self.seen = Some((low, high));
         let overload = self.quantity.overload(time);
         match content {
             ObjectContent::Value if overload.is_some() && self.signal.marker => marker(data_type),
@@ -454,7 +451,7 @@ impl Channel {
 
     /// Computes the integer forms of every limit from the REAL32 form, except the object `exact`.
     fn align(&self, objects: &mut Objects, exact: Option<ObjectId>) {
-        for (object, _) in self.objects_in_unit.iter().filter(|(object, _)| Some(*object) != exact) {
+        for (object, _) in self.follows.iter().filter(|(object, _)| Some(*object) != exact) {
             let Some((own, real)) = self.pv(objects, *object).zip(self.pv(objects, real_form(*object))) else {
                 continue;
             };
