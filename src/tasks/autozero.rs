@@ -54,7 +54,7 @@ impl ZeroTarget {
 /// The options of an autozero or a tare.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// The value to set to zero. A tare has no limit.
+    /// The value to set to zero. A tare ignores the limit.
     pub target: ZeroTarget,
     /// The channel; `None` for the only channel.
     pub channel: Option<u8>,
@@ -79,13 +79,13 @@ pub struct Zeroed {
     pub signal: String,
     /// The unit of all numbers, in ASCII; empty if the device reports none.
     pub unit: String,
-    /// The mean before; `None` if a reading was invalid.
+    /// The mean of the readings before the write; `None` if a reading was invalid.
     pub before: Option<f64>,
-    /// The mean after; `None` if nothing was changed.
+    /// The mean of the readings after the write; `None` if nothing was changed.
     pub after: Option<f64>,
-    /// The offset before; `None` if none can be read.
+    /// The offset before the write; `None` if no offset can be read.
     pub offset_before: Option<Number>,
-    /// The offset after; `None` if none can be read, or nothing was changed.
+    /// The offset after the write; `None` if no offset can be read, or nothing was changed.
     pub offset: Option<Number>,
     /// Whether the zero was stored.
     pub stored: bool,
@@ -96,7 +96,7 @@ pub struct Zeroed {
 }
 
 impl Zeroed {
-    /// The shift of the zero: the change of the offset, else of the reading.
+    /// Returns the change of the offset. If no offset can be read, returns the change of the reading.
     pub fn shift(&self) -> Option<f64> {
         let offsets = self.offset.zip(self.offset_before).map(|(new, old)| new.as_f64() - old.as_f64());
         offsets.or_else(|| Some(self.after? - self.before?))
@@ -130,7 +130,7 @@ pub fn undo_tare(
     let device = survey_nodes(master, &[node], overrides)?;
     let mut device = device.into_iter().next().unwrap_or_else(|| Node::new(node));
     check_confirmed(Some(node), device.model.as_deref())?;
-    let channel = channel::tare(master, &mut device, options.channel)?;
+    let channel = channel::find_tare(master, &mut device, options.channel)?;
     let procedure = Procedure::prepare(master, &device, channel, options)?;
     let Some(old) = procedure.offsets.first().filter(|old| !device.is_read_only(old.object)) else {
         let cause = AutozeroFailure::NoTareZero { channel: procedure.channel.signal.channel };
@@ -138,7 +138,7 @@ pub fn undo_tare(
     };
     let zero = vec![0; old.data_type.width().unwrap_or(4)];
     write_and_verify(master, &device, old.object, &zero, old.data_type)?;
-    let after = samples::take(master, &device, &procedure.channel.signal.name, options.samples)?;
+    let after = samples::read_samples(master, &device, &procedure.channel.signal.name, options.samples)?;
     let offsets = channel::offsets(master, &device, &procedure.channel)?;
     let undo = Note::of_node(node, AutozeroFact::Undo(procedure.undo(&offsets, false)));
     let notes = procedure.changed_offset(&offsets).map(|_| undo).into_iter().collect();
@@ -153,7 +153,8 @@ struct AfterWrite {
     proof: Option<Proof>,
 }
 
-/// Sets a channel to zero if the safety checks allow it. With `store`, the group with the offset is stored.
+/// Sets a channel to zero if the safety checks allow it. With `store`, it also stores the group that contains the
+/// offset.
 ///
 /// # Errors
 /// - A safety check failed, and nothing was changed.
@@ -177,7 +178,7 @@ pub fn autozero(
     check_confirmed(Some(node), device.model.as_deref())?;
     let channel = match options.target {
         ZeroTarget::Autozero => channel::find(master, &device, options.channel),
-        ZeroTarget::Tare => channel::tare(master, &mut device, options.channel),
+        ZeroTarget::Tare => channel::find_tare(master, &mut device, options.channel),
     };
     let procedure = Procedure::prepare(master, &device, channel.map_err(unchanged)?, options).map_err(unchanged)?;
     let mut notes = procedure.check(options)?;
@@ -209,13 +210,13 @@ impl<'a> Procedure<'a> {
     ) -> Result<Procedure<'a>, Failure> {
         let unit = channel.signal.unit;
         let limits = Limits::new(options.limit, channel.range, unit);
-        if let (Limit::Value(_, Some(named)), None) = (options.limit, limits) {
-            let cause = AutozeroFailure::LimitUnit { signal: channel.signal.name, unit, limit: named };
+        if let (Limit::Value(_, Some(limit_unit)), None) = (options.limit, limits) {
+            let cause = AutozeroFailure::LimitUnit { signal: channel.signal.name, unit, limit: limit_unit };
             return Err(Failure::at(device.id, cause));
         }
         let offsets = channel::offsets(master, device, &channel)?;
         let group = group(master, device, &channel, options.store)?;
-        let before = samples::take(master, device, &channel.signal.name, options.samples)?;
+        let before = samples::read_samples(master, device, &channel.signal.name, options.samples)?;
         let decimals = decimals(channel.range, channel.signal.digits);
         Ok(Procedure { target: options.target, device, channel, limits, decimals, offsets, before, group })
     }
@@ -255,20 +256,20 @@ impl<'a> Procedure<'a> {
         let sent = AutozeroEffect::SignatureSent { object: channel.object };
         let signal = || channel.signal.name.clone();
         let offset = self.offsets.first().map(|offset| (offset.object, offset.number));
-        let unsure = |failure: Failure| {
+        let with_effects = |failure: Failure| {
             failure.with(node, sent.clone()).with(node, AutozeroEffect::OffsetBefore { offset, signal: signal() })
         };
         let error = match write(master, device, channel.object, &channel.signature) {
             Ok(_) => None,
             Err(NodeError::Unknown(error)) if !matches!(error.failure, SdoFailure::Cancelled) => Some(error),
             Err(error @ (NodeError::Unknown(_) | NodeError::Bus(_) | NodeError::Interrupted)) => {
-                return Err(unsure(error.into()));
+                return Err(with_effects(error.into()));
             }
             Err(error) => return Err(error.into()),
         };
-        let after = samples::take(master, device, &channel.signal.name, count).map_err(unsure)?;
+        let after = samples::read_samples(master, device, &channel.signal.name, count).map_err(with_effects)?;
         // Read the offset last: if the device restarted in between, it shows the old offset.
-        let offsets = channel::offsets(master, device, channel).map_err(unsure)?;
+        let offsets = channel::offsets(master, device, channel).map_err(with_effects)?;
         let proof = match error {
             None => None,
             Some(_) if self.changed_offset(&offsets).is_some() => Some(Proof::Offset),
@@ -281,14 +282,14 @@ impl<'a> Procedure<'a> {
         Ok(AfterWrite { offsets, after, proof })
     }
 
-    /// The old and the new value of the first offset that has changed.
+    /// Returns the old and the new value of the first offset that changed.
     fn changed_offset<'b>(&'b self, now: &'b [Offset]) -> Option<(&'b Offset, &'b Offset)> {
         let pairs = self.offsets.iter().filter_map(|old| Some((old, now.iter().find(|new| new.object == old.object)?)));
         pairs.into_iter().find(|(old, new)| old.value != new.value)
     }
 
-    /// The largest reading that is accepted as zero afterwards: the allowed variation of the readings. If no limits are
-    /// known, it is half of the reading before.
+    /// Returns the largest mean that is accepted as zero after the write: the limit of the variation. If no limits are
+    /// known, it is half of the mean before. The measured variation is always accepted.
     fn tolerance(&self) -> f64 {
         let before = self.before.mean().unwrap_or(0.0).abs();
         self.limits.map_or(before / 2.0, |limits| limits.spread).max(self.before.spread())
@@ -305,7 +306,7 @@ impl<'a> Procedure<'a> {
         means.is_some_and(|(before, after)| after.abs() + self.before.spread() < before.abs())
     }
 
-    /// Whether the reading was zero before, within its variation and the last digit of the offset.
+    /// Whether the reading was zero before the write. The tolerance is its variation plus one last digit of the offset.
     fn was_zero(&self) -> bool {
         let digit = match self.offsets.first().map(|offset| offset.number) {
             Some(Number::Decimal { digits, .. }) => 10f64.powi(-i32::from(digits)),
@@ -314,7 +315,7 @@ impl<'a> Procedure<'a> {
         self.before.mean().is_some_and(|before| before.abs() <= self.before.spread() + digit)
     }
 
-    /// Checks that the reading is zero afterwards.
+    /// Checks that the reading is zero after the write.
     fn check_is_zero(&self, written: &AfterWrite) -> Result<(), Failure> {
         let node = self.device.id;
         let fail = |cause: AutozeroFailure| {
@@ -368,8 +369,8 @@ impl<'a> Procedure<'a> {
 
     fn report(&self, written: Option<&AfterWrite>, notes: Vec<Note>) -> Zeroed {
         let moved = written.and_then(|written| self.changed_offset(&written.offsets));
-        let still = || written.and_then(|written| self.offsets.first().zip(written.offsets.first()));
-        let (old, new) = match moved.or_else(still) {
+        let first_offset = || written.and_then(|written| self.offsets.first().zip(written.offsets.first()));
+        let (old, new) = match moved.or_else(first_offset) {
             Some((old, new)) => (Some(old), Some(new)),
             None => (self.offsets.first(), None),
         };
@@ -392,7 +393,7 @@ impl<'a> Procedure<'a> {
         Quantity { value, unit: self.channel.signal.unit, decimals: self.decimals }
     }
 
-    /// How to undo the change.
+    /// Returns how to undo the change.
     fn undo(&self, now: &[Offset], stored: bool) -> Undo {
         let is_writable = |object| {
             let entry = self.device.model.as_ref().and_then(|model| model.dictionary.get(object));
@@ -406,7 +407,8 @@ impl<'a> Procedure<'a> {
     }
 }
 
-/// The store group that contains the offset: the application settings, if the device can store them separately.
+/// Returns the store group that contains the offset. If the description does not name it, this is the application
+/// settings if the device can store them separately.
 fn group(master: &mut Master<'_>, device: &Node, channel: &Channel, stores: bool) -> Result<Group, Failure> {
     let described = device.model.iter().flat_map(|model| &model.description.objects);
     let entry = described
@@ -428,10 +430,11 @@ fn unit_text(unit: Option<Unit>) -> String {
     unit.map(|unit| unit.to_string()).unwrap_or_default()
 }
 
-/// The number of decimal digits that resolves 0.01 % of the measuring range; without a range, those of the device.
+/// Returns the number of decimal digits that resolves 0.01 % of the measuring range. If the range is unknown, returns
+/// the number of decimal digits of the device.
 fn decimals(range: Option<f64>, digits: Option<u8>) -> usize {
-    let steps = range.map(|range| range / 1e4).filter(|step| *step > 0.0);
-    let needed = steps.and_then(|step| (0..=9).find(|&decimals| 10f64.powi(-decimals) <= step * 1.000_001));
+    let step = range.map(|range| range / 1e4).filter(|step| *step > 0.0);
+    let needed = step.and_then(|step| (0..=9).find(|&decimals| 10f64.powi(-decimals) <= step * 1.000_001));
     let needed = needed.and_then(|decimals| usize::try_from(decimals).ok());
     needed.unwrap_or_else(|| usize::from(digits.unwrap_or(4)))
 }

@@ -107,7 +107,7 @@ pub fn all_satisfied(verdicts: &[Verdict], failures: &[Failure]) -> Result<(), F
     })
 }
 
-/// Measures, and evaluates the expressions.
+/// Measures the signals, and evaluates the expressions.
 ///
 /// # Errors
 /// Expressions that do not fit the devices (before anything is measured), and failures of the bus.
@@ -179,7 +179,7 @@ fn limit_without_unit(limit: LimitWithoutUnit) -> LogEvent {
     LogEvent::Remark(Remark::LimitWithoutUnit(limit))
 }
 
-/// All signals of these nodes, and the objects that the expressions name.
+/// Returns all signals of these nodes, and the objects named in the expressions.
 fn available<'a>(nodes: &'a [Node], expressions: &[Expression]) -> AvailableSignals<'a> {
     let mut available = AvailableSignals::from_layouts(nodes.iter().map(Node::layout));
     for node in nodes {
@@ -192,7 +192,7 @@ fn available<'a>(nodes: &'a [Node], expressions: &[Expression]) -> AvailableSign
     available
 }
 
-/// The objects to read of all nodes.
+/// Returns the objects to read from all nodes.
 fn wanted_targets(nodes: &[Node], evaluator: &Evaluator) -> Result<Vec<Target>, Failure> {
     let (mut all, mut number) = (Vec::new(), 0);
     for node in nodes {
@@ -207,7 +207,7 @@ fn wanted_targets(nodes: &[Node], evaluator: &Evaluator) -> Result<Vec<Target>, 
     Ok(all)
 }
 
-/// A verdict needs a value, and a value needs a type.
+/// Rejects objects whose data type is unknown or not numeric, because an expression compares numbers.
 fn refuse_unknown_types(targets: &[Target]) -> Result<(), Failure> {
     let without_number = |target: &&Target| !target.reading.data_type().is_some_and(DataType::is_number);
     match targets.iter().find(without_number) {
@@ -260,7 +260,7 @@ fn check_recording(
     Ok(CheckReport { verdicts, started, length: outcome.length, failures, remarks: outcome.remarks })
 }
 
-/// The failures of a recording. Verdicts refer to them by their index.
+/// Returns the failures of a recording. Verdicts refer to them by their index.
 fn failures(report: &RecordingReport) -> impl Iterator<Item = &Failure> {
     let nodes = report.two_devices.iter().chain(&report.replaced);
     report.failed.iter().chain(&report.nothing).chain(nodes)
@@ -331,14 +331,14 @@ impl<'a> Checker<'a> {
             }
         }
         if let Some(first) = samples.first().filter(|_| self.started.is_none() || self.received.len() > before) {
-            self.report_bare_limits(first.at);
+            self.report_limits_without_unit(first.at);
         }
         self.started = self.started.or(samples.first().map(|sample| sample.at));
         self.evaluator.add(samples, sources);
         ControlFlow::Continue(())
     }
 
-    fn report_bare_limits(&mut self, at: Stamp) {
+    fn report_limits_without_unit(&mut self, at: Stamp) {
         for limit in self.evaluator.limits_without_unit() {
             if !self.limits_without_unit.contains(&limit) {
                 self.limits_without_unit.push(limit.clone());
@@ -347,7 +347,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// The nodes whose setup could not be read, with the places of their failures in [`RecordingReport::failed`].
+    /// Returns the nodes whose setup could not be read. The reason is the index of the failure in
+    /// [`RecordingReport::failed`].
     fn missing_nodes(&self) -> Vec<MissingData> {
         let missing = |(at, &node)| MissingData { node, signal: None, reason: Reason::Failed(at) };
         self.failed.iter().enumerate().map(missing).collect()

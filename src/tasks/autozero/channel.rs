@@ -1,5 +1,5 @@
-//! The objects that set the zero of a channel: signature, offset, measuring range. They are from the description or CiA
-//! 404.
+//! Finds the objects that set the zero of a channel: signature, offset, measuring range. They come from the description
+//! or from CiA 404.
 
 use super::ZeroTarget;
 use super::failure::AutozeroFailure;
@@ -57,7 +57,7 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
         if all_known && device.model.as_ref().is_some_and(|model| !model.dictionary.has_index(0x6125)) {
             return Err(fail(AutozeroFailure::NoAutozero { title: title.clone() }));
         }
-        return by_the_standard(master, device, number);
+        return find_by_cia404(master, device, number);
     }
     let available = || described.iter().map(|entry| entry.channel).collect::<Vec<_>>();
     let entry = match (number, described) {
@@ -78,12 +78,12 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
     Ok(Channel { signal, object: entry.object, signature, offsets, is_described, absolute, range })
 }
 
-/// Finds the channel with a tare: its description or EDS has 6139h:n and the net value. The net value becomes the value
-/// of the signal.
+/// Finds the channel that has a tare: the description or EDS contains 6139h:n and the net value. The net value then
+/// replaces the process value of the signal.
 ///
 /// # Errors
-/// No channel, or not this one, has a tare; several have a tare and none was chosen; no answer.
-pub(super) fn tare(master: &mut Master<'_>, device: &mut Node, number: Option<u8>) -> Result<Channel, Failure> {
+/// This channel (or every channel) has no tare; several have a tare and none was chosen; no answer.
+pub(super) fn find_tare(master: &mut Master<'_>, device: &mut Node, number: Option<u8>) -> Result<Channel, Failure> {
     let fail = |cause| Failure::at(device.id, cause);
     let layout = device.layout();
     let known = |object: &ObjectId| layout.model.is_some_and(|model| model.dictionary.get(*object).is_some());
@@ -117,8 +117,8 @@ pub(super) fn tare(master: &mut Master<'_>, device: &mut Node, number: Option<u8
     })
 }
 
-/// 6125h:n, if the device has it.
-fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
+/// Returns the channel with the autozero of CiA 404 (6125h:n), if the device has this object.
+fn find_by_cia404(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
     let node = device.id;
     let signal = match (number, device.channels().as_slice()) {
         (Some(number), _) => signal(device, number)?,
@@ -168,14 +168,14 @@ fn absolute(master: &mut Master<'_>, device: &Node, entry: &Autozero) -> Result<
     }
 }
 
-/// The type of an object: from the description, else `otherwise`.
+/// Returns the data type of an object from the description, or `otherwise` if it is not described.
 fn data_type(device: &Node, object: ObjectId, otherwise: DataType) -> DataType {
     let described = device.model.as_ref().and_then(|model| model.dictionary.get(object));
     described.map_or(otherwise, |entry| entry.data_type)
 }
 
-/// The type of a family of CiA 404: REAL32 for 6xxxh; integers for 7xxxh, 8xxxh and 9xxxh.
-fn of_family(object: ObjectId) -> DataType {
+/// Returns the data type of a CiA 404 object: REAL32 for 6xxxh; integers for 7xxxh, 8xxxh and 9xxxh.
+fn cia404_data_type(object: ObjectId) -> DataType {
     match object.index & 0xf000 {
         0x7000 => DataType::Integer(2),
         0x8000 => DataType::Integer(3),
@@ -184,14 +184,14 @@ fn of_family(object: ObjectId) -> DataType {
     }
 }
 
-/// A number in the unit of the channel; `None` if the device rejects the request.
-fn number(
+/// Reads a number in the unit of the channel; `None` if the device rejects the request.
+fn read_number(
     master: &mut Master<'_>,
     device: &Node,
     signal: &Signal,
     object: ObjectId,
 ) -> Result<Option<Offset>, Failure> {
-    let data_type = data_type(device, object, of_family(object));
+    let data_type = data_type(device, object, cia404_data_type(object));
     match master.read(device.id, object, data_type)? {
         Ok(value) => {
             let number = signal.number(&value).filter(|number| number.is_finite());
@@ -202,17 +202,17 @@ fn number(
     }
 }
 
-/// The width of the measuring range in the present unit: of the sensor, else from span start to span end.
+/// Reads the width of the measuring range in the present unit: the range of the sensor, else span start to span end.
 fn range(
     master: &mut Master<'_>,
     device: &Node,
     signal: &Signal,
-    built: Option<&Range>,
+    sensor_range: Option<&Range>,
 ) -> Result<Option<f64>, Failure> {
     let width = |low: f64, high: f64| Some(high - low).filter(|width| width.is_finite() && *width > 0.0);
-    if let (Some(range), Some(unit)) = (built, signal.unit) {
-        let start = number(master, device, signal, range.start)?;
-        let end = number(master, device, signal, range.end)?;
+    if let (Some(range), Some(unit)) = (sensor_range, signal.unit) {
+        let start = read_number(master, device, signal, range.start)?;
+        let end = read_number(master, device, signal, range.end)?;
         let code = master.read(device.id, range.unit, DataType::Unsigned(4))?.ok().and_then(|code| code.as_u64());
         let from = code.and_then(|code| u32::try_from(code).ok()).map(Unit);
         let ends = start.zip(end).zip(from).and_then(|((start, end), from)| {
@@ -231,19 +231,19 @@ fn range(
         None => [0x148, 0x149].map(|index| Some(ObjectId::new(family | index, signal.channel))),
     };
     let (Some(start), Some(end)) = (start, end) else { return Ok(None) };
-    let start = number(master, device, signal, start)?;
-    let end = number(master, device, signal, end)?;
+    let start = read_number(master, device, signal, start)?;
+    let end = read_number(master, device, signal, end)?;
     Ok(start.zip(end).and_then(|(start, end)| width(start.number.as_f64(), end.number.as_f64())))
 }
 
-/// The offsets that can be read.
+/// Reads the offsets. Offsets that the device does not have are omitted.
 ///
 /// # Errors
 /// No answer, a bus error, Ctrl-C.
 pub(super) fn offsets(master: &mut Master<'_>, device: &Node, channel: &Channel) -> Result<Vec<Offset>, Failure> {
     let mut found = Vec::new();
     for &object in &channel.offsets {
-        found.extend(number(master, device, &channel.signal, object)?);
+        found.extend(read_number(master, device, &channel.signal, object)?);
     }
     Ok(found)
 }

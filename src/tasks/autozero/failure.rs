@@ -174,7 +174,7 @@ pub enum AutozeroEffect {
         /// The signal.
         signal: String,
     },
-    /// The shift of the zero, if known.
+    /// The zero was shifted by this value; `None` if it is unknown.
     Moved(Option<Quantity>),
     /// The zero was stored.
     Stored,
@@ -182,10 +182,10 @@ pub enum AutozeroEffect {
     Undo(Undo),
 }
 
-/// How a zero is undone.
+/// How to undo a zero.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Undo {
-    /// By writing the previous offset.
+    /// Write the previous offset.
     Write {
         /// The object.
         object: ObjectId,
@@ -196,9 +196,9 @@ pub enum Undo {
         /// The group to be stored afterwards, if the zero is stored.
         store: Option<Group>,
     },
-    /// By restoring the factory defaults, because no offset can be written and the zero is stored.
+    /// Restore the factory defaults, because no offset can be written and the zero is stored.
     Restore,
-    /// By a reset, because the zero is not stored.
+    /// Reset the device, because the zero is not stored.
     Reset,
 }
 
@@ -208,7 +208,7 @@ impl Undo {
     }
 }
 
-/// The proof that the device executed a signature without an acknowledgement.
+/// The proof that the device executed a signature that it did not acknowledge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Proof {
     /// The offset changed.

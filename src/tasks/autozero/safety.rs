@@ -29,7 +29,7 @@ pub enum Limit {
 pub(super) struct Limits {
     pub(super) reading: f64,
     pub(super) spread: f64,
-    pub(super) sum: f64,
+    pub(super) total_offset: f64,
     /// The limit of the reading in percent of the range; `None` if it was given as a value.
     percent: Option<f64>,
     /// The limit of the spread in percent of the range; `None` if the range is unknown.
@@ -37,7 +37,7 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    /// `None` if the limit is a part of the range and the range is unknown, or if its unit does not convert.
+    /// Returns `None` if the limit is a part of an unknown range, or if the unit of the limit does not convert.
     pub(super) fn new(limit: Limit, range: Option<f64>, unit: Option<Unit>) -> Option<Limits> {
         let (reading, percent) = match limit {
             Limit::Default => (range? * READING_LIMIT, Some(100.0 * READING_LIMIT)),
@@ -51,9 +51,9 @@ impl Limits {
             }
         };
         let spread = VARIATION_LIMIT * range.map_or(reading, |range| range * READING_LIMIT);
-        let sum = range.map_or(reading, |range| reading.max(range * OFFSET_LIMIT));
+        let total_offset = range.map_or(reading, |range| reading.max(range * OFFSET_LIMIT));
         let spread_percent = range.map(|_| 100.0 * READING_LIMIT * VARIATION_LIMIT);
-        Some(Limits { reading, spread, sum, percent, spread_percent })
+        Some(Limits { reading, spread, total_offset, percent, spread_percent })
     }
 }
 
@@ -132,7 +132,7 @@ impl Measured<'_> {
         Quantity { value, unit: self.unit, decimals: self.decimals }
     }
 
-    /// All failed checks, the most serious first.
+    /// Returns all failed checks, the most serious first.
     pub(super) fn failed_checks(&self, limits: Option<&Limits>) -> Vec<FailedCheck> {
         let mut found = Vec::new();
         let signal = || self.signal.to_owned();
@@ -168,9 +168,9 @@ impl Measured<'_> {
                 percent: limits.spread_percent,
             });
         }
-        let total = self.offset.map(|offset| offset - mean).filter(|total| total.abs() > limits.sum);
+        let total = self.offset.map(|offset| offset - mean).filter(|total| total.abs() > limits.total_offset);
         if let (Some(total), Some(offset)) = (total, self.offset) {
-            let limit = self.quantity(limits.sum);
+            let limit = self.quantity(limits.total_offset);
             found.push(FailedCheck::TotalOffset { offset: self.quantity(offset), total: self.quantity(total), limit });
         }
         found
@@ -194,13 +194,13 @@ mod tests {
     fn limit_is_a_part_of_the_range_or_a_value() {
         let bar = Unit::from_symbol("bar");
         let limits = Limits::new(Limit::Default, Some(10.0), bar).expect("known");
-        assert_eq!((limits.reading, limits.spread, limits.sum), (0.1, 0.05, 0.5));
+        assert_eq!((limits.reading, limits.spread, limits.total_offset), (0.1, 0.05, 0.5));
         let limits = Limits::new(Limit::Value(3.5, None), Some(10.0), bar).expect("known");
-        assert_eq!((limits.reading, limits.spread, limits.sum), (3.5, 0.05, 3.5));
+        assert_eq!((limits.reading, limits.spread, limits.total_offset), (3.5, 0.05, 3.5));
         let limits = Limits::new(Limit::Value(200.0, Unit::from_symbol("mbar")), None, bar).expect("known");
         assert!((limits.reading - 0.2).abs() < 1e-12 && (limits.spread - 0.1).abs() < 1e-12);
         let limits = Limits::new(Limit::Percent(2.0), Some(10.0), None).expect("known");
-        assert_eq!((limits.reading, limits.sum), (0.2, 0.5));
+        assert_eq!((limits.reading, limits.total_offset), (0.2, 0.5));
         // A difference of 9 degF is 5 K.
         let (fahrenheit, kelvin) = (Unit::from_symbol("degF"), Unit::from_symbol("K"));
         let limits = Limits::new(Limit::Value(9.0, fahrenheit), None, kelvin).expect("known");

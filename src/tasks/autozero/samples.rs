@@ -1,4 +1,4 @@
-//! Several readings of one signal, one after the other.
+//! Reads one signal several times, and computes the statistics.
 
 use crate::bus::Received;
 use crate::canopen::id::NodeId;
@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// The time between two readings: at least one measuring cycle of the transmitter (DPS: 100 ms).
-const BETWEEN: Duration = Duration::from_millis(100);
+const READING_INTERVAL: Duration = Duration::from_millis(100);
 
 /// The statistics of several readings.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,7 +43,7 @@ impl Samples {
     }
 
     fn pause(&mut self, master: &mut Master<'_>, node: NodeId) -> Result<(), Error> {
-        let until = master.now() + BETWEEN;
+        let until = master.now() + READING_INTERVAL;
         wait(master, until, Policy::Command, |_, event| {
             if let Happening::Frame(received) = event {
                 self.watch(node, &received);
@@ -79,7 +79,12 @@ impl Samples {
 ///
 /// # Errors
 /// An SDO abort, no answer, a bus error, Ctrl-C.
-pub(super) fn take(master: &mut Master<'_>, device: &Node, signal: &str, count: u32) -> Result<Samples, Failure> {
+pub(super) fn read_samples(
+    master: &mut Master<'_>,
+    device: &Node,
+    signal: &str,
+    count: u32,
+) -> Result<Samples, Failure> {
     let mut samples = Samples::default();
     for target in targets(device, &[Wanted::Signal(signal.to_owned())], &mut 0)? {
         for _ in 0..count {

@@ -21,10 +21,10 @@ pub fn check_figures(
 ) -> Result<CheckReport, Failure> {
     let measured = health(master, options)?;
     let at = master.bus().now();
-    let any = options.nodes.first().or(measured.nodes.keys().next()).copied().unwrap_or(NodeId::MIN);
+    let bus_node = options.nodes.first().or(measured.nodes.keys().next()).copied().unwrap_or(NodeId::MIN);
     let (mut sources, mut samples) = (Vec::new(), Vec::new());
     for figure in figures(&measured) {
-        let (node, signal, unit) = (figure.node.unwrap_or(any), figure.name.as_str().into(), figure.unit.into());
+        let (node, signal, unit) = (figure.node.unwrap_or(bus_node), figure.name.as_str().into(), figure.unit.into());
         let value = figure.value.map(Number::Real64);
         let (source, raw) = (sources.len(), Raw::new(&[]));
         samples.extend(value.map(|_| Sample { at, source, value, status: None, raw, doubt: None }));
@@ -40,7 +40,7 @@ pub fn check_figures(
         let expression = expressions.iter().find(|expression| expression.text() == text);
         expression.is_some_and(|expression| expression.figures().iter().all(|name| name.starts_with("bus.")))
     };
-    verdicts.retain(|verdict| !of_bus(&verdict.text) || verdict.node == Some(any));
+    verdicts.retain(|verdict| !of_bus(&verdict.text) || verdict.node == Some(bus_node));
     verdicts.iter_mut().filter(|verdict| of_bus(&verdict.text)).for_each(|verdict| verdict.node = None);
     let started = Some(at);
     Ok(CheckReport { verdicts, started, length: Duration::ZERO, failures: Vec::new(), remarks: Vec::new() })

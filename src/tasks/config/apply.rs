@@ -57,9 +57,9 @@ pub struct Row {
 /// The result for one device.
 #[derive(Clone, Debug)]
 pub struct Applied {
-    /// The node-ID before.
+    /// The node-ID before the change.
     pub node: NodeId,
-    /// The settings before.
+    /// The settings before the change.
     pub before: Snapshot,
     /// The settings now, read back.
     pub after: Snapshot,
@@ -85,7 +85,8 @@ pub trait Journal {
     fn finish(&mut self);
 }
 
-/// The settings of a file that differ from those of the device, and notes about ignored settings.
+/// Returns the settings to apply, and notes about ignored settings. With `exact`, settings that are missing in the file
+/// get their factory defaults.
 pub fn targets(file: &FileSettings, before: &Snapshot, options: &Options) -> (Vec<Wanted>, Vec<Note>) {
     let id = before.node.id;
     let (mut used, ignored): (Vec<Wanted>, Vec<Wanted>) =
@@ -183,7 +184,7 @@ struct Work<'m, 'bus> {
 }
 
 impl Work<'_, '_> {
-    /// The settings that differ from those of the device.
+    /// Returns the settings whose present value on the device differs from the requested value.
     fn differing(&self) -> Vec<&Wanted> {
         let differs = |wanted: &&Wanted| self.now.content(&wanted.setting).as_ref() != Some(&wanted.content);
         self.targets.iter().filter(differs).collect()
@@ -399,7 +400,7 @@ impl Work<'_, '_> {
         if self.options.store && self.written.len() > count { self.store(false) } else { Ok(()) }
     }
 
-    /// All changes, including conversions by the device after a change of the unit.
+    /// Returns all changes, including conversions by the device after a change of the unit.
     fn rows(&self) -> Vec<Row> {
         let row = |setting: &super::setting::Setting| {
             let old = self.before.settings.iter().find(|old| old.key == setting.key)?;
@@ -410,11 +411,11 @@ impl Work<'_, '_> {
         self.now.settings.iter().filter_map(row).collect()
     }
 
-    /// The failure with the written and the missing settings.
+    /// Adds the written and the missing settings to a failure.
     fn explain(&self, failure: Failure) -> Failure {
         let is_written = |key: &String| self.written.iter().any(|row| row.key == *key);
-        let initial = |wanted: &&Wanted| self.before.content(&wanted.setting).as_ref() != Some(&wanted.content);
-        let keys = self.targets.iter().filter(initial).map(|wanted| wanted.entry.key.clone());
+        let differed = |wanted: &&Wanted| self.before.content(&wanted.setting).as_ref() != Some(&wanted.content);
+        let keys = self.targets.iter().filter(differed).map(|wanted| wanted.entry.key.clone());
         let missing = keys.filter(|key| !is_written(key)).collect();
         let effect = ConfigEffect { written: self.written.clone(), missing, arguments: self.options.arguments.clone() };
         failure.with(self.now.node.id, effect)

@@ -1,4 +1,4 @@
-//! The devices that are plugged in one after the other (`config apply --prompt`).
+//! Finds devices that are plugged in one after the other (`config apply --prompt`).
 
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
@@ -29,35 +29,36 @@ fn is_same(one: &FoundSlave, other: &FoundSlave) -> bool {
 }
 
 /// Whether a device has no node-ID, or the factory node-ID of its kind.
-fn is_delivered(found: &FoundSlave) -> bool {
+fn is_unconfigured(found: &FoundSlave) -> bool {
     let factory = found.model.as_ref().and_then(|model| model.description.factory.node_id);
     found.node.is_none() || factory == found.node
 }
 
 impl Arrivals {
-    /// Searches once for new devices: those that were not on the bus before, and in the first search those without a
-    /// node-ID and with the factory node-ID of their kind. Nothing is changed.
+    /// Searches once for new devices, and changes nothing. A device is new if it was not on the bus before. In the
+    /// first search, a device is new if it has no node-ID or the factory node-ID of its kind.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.
     pub fn search(&mut self, master: &mut Master<'_>) -> Result<Vec<FoundSlave>, Failure> {
-        let Some(found) = look(master)? else { return Ok(Vec::new()) };
-        let known = self.known.get_or_insert_with(|| found.iter().filter(|one| !is_delivered(one)).cloned().collect());
+        let Some(found) = search_bus(master)? else { return Ok(Vec::new()) };
+        let known =
+            self.known.get_or_insert_with(|| found.iter().filter(|one| !is_unconfigured(one)).cloned().collect());
         known.retain(|one| found.iter().any(|other| is_same(one, other)));
         Ok(found.into_iter().filter(|one| !known.iter().any(|other| is_same(one, other))).collect())
     }
 
-    /// Searches once for a device that was configured. `true` if it was unplugged.
+    /// Searches once for the configured device. Returns `true` if it was missing in two searches in succession.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.
     pub fn is_unplugged(&mut self, master: &mut Master<'_>, device: &FoundSlave) -> Result<bool, Failure> {
-        let Some(found) = look(master)? else { return Ok(false) };
-        let is_it = |other: &FoundSlave| match device.address {
+        let Some(found) = search_bus(master)? else { return Ok(false) };
+        let is_device = |other: &FoundSlave| match device.address {
             Some(address) => other.address == Some(address),
             None => other.node == device.node,
         };
-        self.misses = if found.iter().any(is_it) { 0 } else { self.misses + 1 };
+        self.misses = if found.iter().any(is_device) { 0 } else { self.misses + 1 };
         let is_gone = self.misses == MISSES;
         if is_gone {
             self.misses = 0;
@@ -66,9 +67,9 @@ impl Arrivals {
     }
 }
 
-/// The devices on the bus, a short time from now. `None` if a service was disturbed, for example by a device that is
-/// being plugged in.
-fn look(master: &mut Master<'_>) -> Result<Option<Vec<FoundSlave>>, Failure> {
+/// Waits for [`SEARCH_INTERVAL`], and returns the devices on the bus. Returns `None` if a service was disturbed, for
+/// example by a device that is being plugged in.
+fn search_bus(master: &mut Master<'_>) -> Result<Option<Vec<FoundSlave>>, Failure> {
     // Without any device on the bus, no node acknowledges the requests.
     master.set_tolerates_outages(true);
     let paused = pause(master, master.now() + SEARCH_INTERVAL, Policy::Reconnect);
@@ -81,10 +82,10 @@ fn look(master: &mut Master<'_>) -> Result<Option<Vec<FoundSlave>>, Failure> {
     }
 }
 
-/// Gives a device without a node-ID its node-ID. It is addressed by its identity.
+/// Gives a device without a node-ID its node-ID. The device is addressed by its identity.
 ///
 /// # Errors
-/// Those of [`assign`].
+/// The errors of [`assign`].
 pub fn assign_first(
     master: &mut Master<'_>,
     address: LssAddress,

@@ -63,11 +63,11 @@ impl Sections {
 const CONDITIONS: [&str; 5] =
     ["device.kind", "device.vendor", "device.product", "device.reference", "calibration.serial"];
 
-/// Checks a file against a node. `present` contains the present settings of the device; if it is missing, only the
-/// facts of the description are checked.
+/// Checks a file against a node. `present` contains the present settings of the device. Without them, only the facts of
+/// the description are checked.
 ///
 /// # Errors
-/// Every mistake, in the order of the places.
+/// All mistakes, in the order of their places in the file.
 pub fn check(
     document: &Document,
     node: &Node,
@@ -79,7 +79,7 @@ pub fn check(
     let mut file = FileSettings::default();
     for entry in &document.entries {
         if CONDITIONS.contains(&entry.key.as_str()) || entry.key.starts_with("device.range.") {
-            match condition(entry) {
+            match check_condition(entry) {
                 Ok(()) => file.conditions.push(entry.clone()),
                 Err(problem) => check.mistake(entry, problem),
             }
@@ -96,8 +96,8 @@ pub fn check(
     if mistakes.is_empty() { Ok(file) } else { Err(mistakes) }
 }
 
-/// The form of a condition.
-fn condition(entry: &Entry) -> Result<(), Problem> {
+/// Checks the form of a condition.
+fn check_condition(entry: &Entry) -> Result<(), Problem> {
     let is_number = matches!(entry.key.as_str(), "device.vendor" | "device.product" | "calibration.serial");
     match &entry.value {
         Item::Text(text) if entry.key.starts_with("device.range.") => match range(text) {
@@ -113,7 +113,7 @@ fn condition(entry: &Entry) -> Result<(), Problem> {
     }
 }
 
-/// A number of 32 bits, as an integer or as text.
+/// Parses a 32-bit number, given as an integer or as text.
 pub(super) fn number(item: &Item) -> Option<u32> {
     match item {
         Item::Integer(number) => u32::try_from(*number).ok(),
@@ -122,7 +122,7 @@ pub(super) fn number(item: &Item) -> Option<u32> {
     }
 }
 
-/// A measuring range: its start, if it is given, its end and its unit.
+/// Parses a measuring range. Returns the start (if it is given), the end and the unit.
 pub(super) fn range(text: &str) -> Option<(Option<f64>, f64, Unit)> {
     let quantity = |text: &str| -> Option<(f64, Unit)> {
         let (number, unit) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
@@ -171,7 +171,7 @@ impl Check<'_> {
         }
     }
 
-    /// The setting with this key.
+    /// Returns the setting for a key. The key can also name an explicit COB-ID (`address.`) or an object (`object.`).
     fn find(&self, key: &str) -> Option<&Setting> {
         let own = self.settings.iter().find(|setting| setting.key == key);
         let explicit = || {
@@ -209,7 +209,7 @@ impl Check<'_> {
         }
     }
 
-    /// Why a key is unknown: the object behind it belongs to another key, or names are similar.
+    /// Returns the problem of an unknown key. It suggests the key of the same object, or similar keys.
     fn unknown(&self, key: &str) -> Problem {
         let object = object_of(self.node, key);
         let owner = object.and_then(|object| {
@@ -321,7 +321,7 @@ impl Check<'_> {
         found.into_iter().for_each(|(entry, problem)| self.mistake(&entry, problem));
     }
 
-    /// The value that a setting will have.
+    /// Returns the value of a setting after the change.
     fn resulting(&self, setting: &Setting, file: &FileSettings) -> Option<Content> {
         let wanted = file.wanted.iter().find(|wanted| wanted.setting.key == setting.key);
         wanted.map(|wanted| wanted.content.clone()).or_else(|| self.present?.content(setting))
@@ -348,13 +348,13 @@ impl Check<'_> {
             _ => None,
         };
         let content = self.resulting(other, file)?;
-        let (own, theirs) = (number(&wanted.setting, &wanted.content)?, number(other, &content)?);
-        let is_crossed = if is_lower { own > theirs } else { theirs > own };
+        let (own, other_value) = (number(&wanted.setting, &wanted.content)?, number(other, &content)?);
+        let is_crossed = if is_lower { own > other_value } else { other_value > own };
         let value = other.show(self.node, &self.scales, &content);
         is_crossed.then(|| Problem::Crossed { other: other.key.clone(), value })
     }
 
-    /// Heartbeat and guarding, on devices that accept only one of them.
+    /// Reports heartbeat and guarding if both are on, for devices that accept only one of them.
     fn excluded(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
         let is_on = |content: &Content| matches!(content, Content::Bytes(bytes) if bytes.iter().any(|byte| *byte != 0));
         if !is_on(&wanted.content) {
@@ -369,7 +369,7 @@ impl Check<'_> {
         })
     }
 
-    /// Identifiers that two senders would share, and TPDOs without an identifier.
+    /// Reports an identifier that two senders would share, or a TPDO without an identifier.
     fn same_id(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
         // Without the device, the node-ID and the identifiers that depend on it are unknown.
         self.present?;
@@ -401,13 +401,13 @@ impl Check<'_> {
     }
 }
 
-/// The object that a key of `[object]` names.
+/// Returns the object that a key of `[object]` names.
 fn object_of(node: &Node, key: &str) -> Option<ObjectId> {
     let name = key.strip_prefix("object.")?;
     name.parse().ok().or_else(|| node.entry_by_name(name).map(|entry| entry.object))
 }
 
-/// Objects in the file that are not in the table of settings but that the device may have.
+/// Returns settings for objects that the file names and the device may have, but the table of settings lacks.
 pub(super) fn named_objects(document: &Document, node: &Node, settings: &[Setting]) -> Vec<Setting> {
     let mut extra: Vec<Setting> = Vec::new();
     for entry in &document.entries {
@@ -419,13 +419,13 @@ pub(super) fn named_objects(document: &Document, node: &Node, settings: &[Settin
     extra
 }
 
-/// An object that can be used as a setting: readable, writable, and neither a command nor a PDO parameter.
+/// Returns an object as a setting, if it is readable, writable, and neither a command nor a PDO parameter.
 pub(super) fn named_object(node: &Node, known: &dictionary::Entry) -> Option<Setting> {
     let object = known.object;
     let is_plain = known.access.is_readable() && known.access.is_writable() && known.data_type != DataType::Domain;
     let is_command = matches!(object.index, 0x1003 | 0x1010 | 0x1011 | 0x1400..=0x1bff);
-    let acts = node.described(object).is_some_and(|described| described.signature.is_some());
-    if !is_plain || is_command || acts {
+    let has_signature = node.described(object).is_some_and(|described| described.signature.is_some());
+    if !is_plain || is_command || has_signature {
         return None;
     }
     let name = Some(known.full_name()).filter(|name| !dictionary::spellings(name).is_empty());

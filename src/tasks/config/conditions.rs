@@ -1,4 +1,4 @@
-//! The conditions of `[device]`: the kind of device, its measuring range, relative or absolute pressure.
+//! Checks the conditions of `[device]`: the kind of device, its measuring range, relative or absolute pressure.
 
 use super::check::{FileSettings, number, range};
 use super::failure::ConfigFailure;
@@ -17,20 +17,20 @@ const RANGE_TOLERANCE: f64 = 0.001;
 /// [`ConfigFailure::Condition`] with the first condition that the device does not meet.
 pub fn check_device(file: &FileSettings, snapshot: &Snapshot, with_calibration: bool) -> Result<(), Failure> {
     let node = snapshot.node.id;
-    let counts = |entry: &&Entry| with_calibration || entry.key != "calibration.serial";
-    if let Some((entry, found)) = unmet(file, snapshot).into_iter().find(|(entry, _)| counts(entry)) {
+    let is_checked = |entry: &&Entry| with_calibration || entry.key != "calibration.serial";
+    if let Some((entry, found)) = unmet(file, snapshot).into_iter().find(|(entry, _)| is_checked(entry)) {
         let (key, place, wanted) = (entry.key.clone(), entry.value_at, entry.value.clone());
         return Err(Failure::at(node, ConfigFailure::Condition { place, key, wanted, found }));
     }
     let has_serial = file.conditions.iter().any(|entry| entry.key == "calibration.serial");
-    let calibrates = file.wanted.iter().find(|wanted| wanted.entry.key.starts_with("calibration."));
-    match calibrates.filter(|_| with_calibration && !has_serial) {
+    let calibration = file.wanted.iter().find(|wanted| wanted.entry.key.starts_with("calibration."));
+    match calibration.filter(|_| with_calibration && !has_serial) {
         Some(wanted) => Err(Failure::at(node, ConfigFailure::NoSerial { place: wanted.entry.key_at })),
         None => Ok(()),
     }
 }
 
-/// The conditions that a device does not meet, with its own values.
+/// Returns the conditions that a device does not meet, with the values of the device.
 pub(super) fn unmet<'a>(file: &'a FileSettings, snapshot: &Snapshot) -> Vec<(&'a Entry, Option<Item>)> {
     let kind = snapshot.kind();
     let identity = &snapshot.node.identity;
@@ -71,9 +71,9 @@ fn is_same_range(entry: &Entry, found: &Range) -> bool {
     let own_end = found.end.as_f64();
     let tolerance = 1.5 * found.step + RANGE_TOLERANCE * (own_end - own_start.unwrap_or(0.0)).abs();
     let is_near = |wanted: f64, own: f64| convert(wanted).is_some_and(|wanted| (wanted - own).abs() <= tolerance);
-    let starts = match (start, own_start) {
+    let is_same_start = match (start, own_start) {
         (Some(wanted), Some(own)) => is_near(wanted, own),
         (wanted, own) => wanted.is_none() && own.is_none(),
     };
-    starts && is_near(end, own_end)
+    is_same_start && is_near(end, own_end)
 }

@@ -19,20 +19,20 @@ use std::collections::{BTreeMap, BTreeSet};
 
 const U32: DataType = DataType::Unsigned(4);
 
-/// Objects of a DCF that are not in the table of settings but that the device may have.
+/// Returns settings for objects that the DCF contains and the device may have, but the table of settings lacks.
 pub(super) fn named_objects(dcf: &Eds, node: &Node, settings: &[Setting]) -> Vec<Setting> {
     let is_new = |object: &&ObjectId| !settings.iter().any(|setting| setting.object == **object);
     let entries = dcf.parameter_values.keys().filter(is_new).filter_map(|object| dcf.dictionary.get(*object));
     let setting = |entry| {
         let found = named_object(node, entry)?;
         let data_type = node.known_type(found.object).unwrap_or(entry.data_type);
-        // The name in the DCF may be that of another object of the device.
+        // The device may use this name for another object.
         Some(Setting { key: format!("object.{}", found.object), data_type, ..found })
     };
     entries.filter_map(setting).collect()
 }
 
-/// The objects of a setting.
+/// Returns the objects of a setting.
 fn objects(setting: &Setting) -> Vec<ObjectId> {
     match setting.form {
         Form::Signals(number) => (0..=64).map(|sub| number.mapping(sub)).collect(),
@@ -41,7 +41,8 @@ fn objects(setting: &Setting) -> Vec<ObjectId> {
 }
 
 impl Snapshot {
-    /// The settings of a DCF as a settings file for this device, and notes about objects that the device lacks.
+    /// Converts the settings of a DCF to a settings file for this device, with notes about objects that the device
+    /// lacks.
     pub fn document_of(&self, dcf: &Eds) -> (Document, Vec<Note>) {
         let future = self.with_values(dcf);
         let mut document = Document::default();
@@ -101,7 +102,7 @@ impl Snapshot {
         (document, missing.into_iter().chain(others).collect())
     }
 
-    /// The settings of the device with the values of a DCF.
+    /// Returns the settings of the device with the values of a DCF.
     fn with_values(&self, dcf: &Eds) -> Snapshot {
         let id = self.node.id;
         let written_for = dcf.commissioning.as_ref().and_then(|commissioning| commissioning.node_id).unwrap_or(id);
@@ -112,7 +113,7 @@ impl Snapshot {
             if let Ok(bytes) = value.encode(own.data_type, id) {
                 let bytes = match (own.form.clone(), <[u8; 4]>::try_from(bytes.as_slice())) {
                     (Form::CobId(default), Ok(word)) if !matches!(value, Scalar::NodeIdPlus(_)) => {
-                        follow(u32::from_le_bytes(word), default, id, written_for).to_le_bytes().to_vec()
+                        adapt_cob_id(u32::from_le_bytes(word), default, id, written_for).to_le_bytes().to_vec()
                     }
                     _ => bytes,
                 };
@@ -125,16 +126,16 @@ impl Snapshot {
                 let bytes = dcf.parameter_values.get(&object)?.encode(U32, id).ok()?;
                 Some(u32::from_le_bytes(bytes.try_into().ok()?))
             };
-            let small = |sub: u8| word(number.communication(sub)).and_then(|word| u16::try_from(word).ok());
+            let word16 = |sub: u8| word(number.communication(sub)).and_then(|word| u16::try_from(word).ok());
             if let Some(found) = word(number.communication(1)) {
                 let is_formula =
                     matches!(dcf.parameter_values.get(&number.communication(1)), Some(Scalar::NodeIdPlus(_)));
                 let default = super::setting::default_id(&self.node, number);
-                tpdo.cob_id = CobId(if is_formula { found } else { follow(found, default, id, written_for) });
+                tpdo.cob_id = CobId(if is_formula { found } else { adapt_cob_id(found, default, id, written_for) });
             }
-            tpdo.transmission = small(2).and_then(|code| u8::try_from(code).ok()).unwrap_or(tpdo.transmission);
-            tpdo.inhibit_100us = tpdo.inhibit_100us.map(|old| small(3).unwrap_or(old));
-            tpdo.event_timer_ms = tpdo.event_timer_ms.map(|old| small(5).unwrap_or(old));
+            tpdo.transmission = word16(2).and_then(|code| u8::try_from(code).ok()).unwrap_or(tpdo.transmission);
+            tpdo.inhibit_100us = tpdo.inhibit_100us.map(|old| word16(3).unwrap_or(old));
+            tpdo.event_timer_ms = tpdo.event_timer_ms.map(|old| word16(5).unwrap_or(old));
             let count = word(number.mapping(0)).and_then(|count| u8::try_from(count).ok());
             let count = count.unwrap_or(u8::try_from(tpdo.mapping.len()).unwrap_or(u8::MAX));
             let entry = |sub: u8| {
@@ -150,8 +151,8 @@ impl Snapshot {
         future
     }
 
-    /// The objects of a DCF with the settings of the device. The calibration is omitted, because a DCF tool would write
-    /// it to every device.
+    /// Converts the settings of the device to the objects of a DCF. The calibration is omitted, because a DCF tool
+    /// would write it to every device.
     pub fn dcf_objects(&self) -> BTreeMap<ObjectId, (DataType, Scalar)> {
         let id = u32::from(self.node.id.get());
         let word = |word: u32, default: Option<u16>| match default {
@@ -201,7 +202,7 @@ impl Snapshot {
 }
 
 /// If a COB-ID is the default for the node-ID of the DCF, returns the default for this node-ID.
-fn follow(word: u32, default: u16, id: NodeId, written_for: NodeId) -> u32 {
+fn adapt_cob_id(word: u32, default: u16, id: NodeId, written_for: NodeId) -> u32 {
     let [default, id, other] = [u32::from(default), u32::from(id.get()), u32::from(written_for.get())];
     if default > id && word & 0x1fff_ffff == default - id + other { word & !0x1fff_ffff | default } else { word }
 }

@@ -1,4 +1,4 @@
-//! The settings of a device as the rows of a file.
+//! Converts the settings of a device to the rows of a file.
 
 use super::identity::Range;
 use super::setting::{Form, Setting, Stage};
@@ -43,7 +43,7 @@ pub struct Dump {
 /// The sections of a file, in their order.
 pub const SECTIONS: [&str; 7] = ["device", "address", "node", "signal", "tpdo", "object", "calibration"];
 
-/// The path of a value in a file; explicit COB-IDs are in `[address]`.
+/// Returns the path of a value in a file; explicit COB-IDs are in `[address]`.
 pub(super) fn path(setting: &Setting, content: &Content) -> String {
     match (&setting.form, content) {
         (Form::CobId(default), Content::Number(id))
@@ -56,8 +56,7 @@ pub(super) fn path(setting: &Setting, content: &Content) -> String {
 }
 
 impl Snapshot {
-    /// The rows of a file with the settings. With `changed`, settings that are known to be factory defaults are
-    /// omitted.
+    /// Returns the settings as rows of a file. With `changed`, factory defaults and fixed values are omitted.
     pub fn dump(&self, changed: bool) -> Dump {
         let (node, identity, kind) = (self.node.id, &self.node.identity, self.kind());
         let row = |key: &str, value: Item| Row {
@@ -126,14 +125,14 @@ impl Snapshot {
     }
 }
 
-/// The number of the section of a key.
+/// Returns the position of the section of a key in [`SECTIONS`].
 pub(super) fn section(key: &str) -> usize {
     let first = key.split('.').next().unwrap_or_default();
     SECTIONS.iter().position(|section| *section == first).unwrap_or(SECTIONS.len())
 }
 
 impl Range {
-    /// `0 bar to 10 bar`; `100 psi` if only the width is known.
+    /// Returns the range as text: `0 bar to 10 bar`, or `100 psi` if only the width is known.
     pub fn text(&self) -> String {
         let unit = self.unit.map(|unit| format!(" {unit}")).unwrap_or_default();
         let end = format!("{}{unit}", self.end);

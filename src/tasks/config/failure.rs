@@ -38,7 +38,7 @@ pub enum ConfigFailure {
     ReadBackDiffers {
         /// Key, value of the file, value of the device.
         settings: Vec<(String, Item, Option<Item>)>,
-        /// Whether the device was reset before.
+        /// Whether the values were read back after a reset.
         is_after_reset: bool,
     },
     /// The bit rate is not changed while other nodes are on the bus.
@@ -58,7 +58,7 @@ pub enum ConfigFailure {
         /// The serial numbers.
         serials: Vec<u32>,
     },
-    /// A device without a node-ID, and the table has none for it.
+    /// A device has no node-ID, and the table contains none for it.
     NoNodeId {
         /// The serial number.
         serial: u32,
@@ -131,7 +131,7 @@ impl ConfigFailure {
         }
     }
 
-    /// The failures for the mistakes of a file.
+    /// Converts the mistakes of a file to failures.
     pub fn of_mistakes(file: &str, node: Option<NodeId>, mistakes: Vec<Mistake>) -> Vec<Failure> {
         let failure = |mistake: Mistake| {
             let cause = ConfigFailure::Mistake { file: file.to_owned(), mistake: Box::new(mistake) };

@@ -18,7 +18,7 @@ pub struct Range {
     pub end: Number,
     /// The unit of both ends.
     pub unit: Option<Unit>,
-    /// The rounding of both ends after a change of the unit.
+    /// The step to which the device rounds both ends after a change of the unit.
     pub step: f64,
 }
 
@@ -37,14 +37,14 @@ pub struct Kind {
     pub dates: Vec<(&'static str, String)>,
 }
 
-/// The names of the objects of a date, and the meaning of the date.
+/// The meaning of each date, and the names of its three objects.
 const DATES: [(&str, [&str; 3]); 2] = [
     ("calibrated", ["calibration-year", "calibration-month", "calibration-day"]),
     ("produced", ["production-year", "production-month", "production-day"]),
 ];
 
-/// The objects of a measuring range: start, end, and their unit if it is not that of the signal.
-struct Places {
+/// The objects of a measuring range: start, end, and unit if it differs from the unit of the signal.
+struct RangeObjects {
     signal: usize,
     /// `None` if the device has only the width of the range. The object of the width is then in `end`.
     start: Option<ObjectId>,
@@ -52,14 +52,14 @@ struct Places {
     unit: Option<ObjectId>,
 }
 
-/// The measuring ranges from the description, from spans that cannot be changed, or else from the scaling.
-fn ranges(node: &Node) -> Vec<Places> {
+/// Returns the measuring ranges: from the description, from spans that cannot be changed, or from the scaling.
+fn ranges(node: &Node) -> Vec<RangeObjects> {
     let Some(model) = &node.model else { return Vec::new() };
     let description = &model.description;
     let has = |object: ObjectId| model.dictionary.get(object).map(|entry| entry.object);
     let mut all = Vec::new();
     for (at, signal) in node.signals.iter().enumerate() {
-        let places = |start, end, unit| Places { signal: at, start, end, unit };
+        let places = |start, end, unit| RangeObjects { signal: at, start, end, unit };
         let zero = description.autozero.iter().find(|zero| zero.channel == signal.channel);
         let range = zero.and_then(|zero| zero.range.as_ref());
         let entry = description.signals.iter().find(|entry| entry.name == signal.name);
@@ -79,7 +79,7 @@ fn ranges(node: &Node) -> Vec<Places> {
     all
 }
 
-/// The objects that contain kind, measuring range and dates.
+/// Returns the objects that contain kind, measuring range and dates.
 pub(super) fn objects(node: &Node) -> Vec<ObjectId> {
     let mut objects: Vec<ObjectId> =
         ranges(node).into_iter().flat_map(|places| [places.start, Some(places.end), places.unit]).flatten().collect();
@@ -96,11 +96,11 @@ impl Snapshot {
         self.node.data_type(object).decode(self.bytes(object)?).ok()
     }
 
-    /// The facts that identify the kind of the device.
+    /// Returns the facts that identify the kind of the device.
     pub fn kind(&self) -> Kind {
         let model = self.node.model.as_ref();
         let description = model.map(|model| &model.description).filter(|description| description.name != "eds");
-        let range = |places: Places| {
+        let range = |places: RangeObjects| {
             let signal = self.node.signals.get(places.signal)?;
             let digits = signal.digits.unwrap_or(0);
             let unit = match places.unit {

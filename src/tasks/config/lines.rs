@@ -1,4 +1,4 @@
-//! The writes of an application as a list of single steps (`config apply --dry-run`).
+//! Lists the steps of `config apply` without executing them (`--dry-run`).
 
 use super::apply::{Options, targets};
 use super::check::{FileSettings, Wanted};
@@ -18,7 +18,7 @@ use std::collections::BTreeSet;
 pub struct Line {
     /// The node.
     pub node: NodeId,
-    /// The settings that the step belongs to.
+    /// The keys of the settings that the step belongs to.
     pub key: String,
     /// The step.
     pub step: Step,
@@ -44,7 +44,7 @@ pub enum Step {
     Store,
 }
 
-/// The steps of an application, in their order, with the notes about it.
+/// Returns the steps of `config apply` in their order, and the notes about it.
 ///
 /// If the unit changes, the device may convert other values by itself; the steps then list all of them.
 pub fn lines(file: &FileSettings, before: &Snapshot, options: &Options) -> (Vec<Line>, Vec<Note>) {
