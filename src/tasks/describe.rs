@@ -27,7 +27,7 @@ pub struct Draft {
 pub struct DraftObject {
     /// Its address.
     pub object: ObjectId,
-    /// The name in the EDS, the standard or the profile, without the sub-index of a run.
+    /// The name in the EDS, the standard or the profile. It does not contain the sub-index.
     pub name: Option<String>,
     /// Whether several sub-indices have this name.
     pub is_numbered: bool,
@@ -44,11 +44,11 @@ pub struct DraftObject {
 /// The number of channels of CiA 404 whose objects are searched.
 const MAX_CHANNELS: usize = 16;
 
-/// The indices of a channel in each family of CiA 404, without the first digit.
+/// The objects that a channel has in each family of CiA 404: the index without its first digit.
 const FAMILY: [u16; 16] =
     [0x100, 0x120, 0x121, 0x122, 0x123, 0x124, 0x126, 0x127, 0x130, 0x133, 0x134, 0x135, 0x136, 0x138, 0x148, 0x149];
 
-/// The objects of a channel that exist once.
+/// The objects of a channel that are the same for all families.
 const CHANNEL: [u16; 9] = [0x6110, 0x6111, 0x6112, 0x6114, 0x6131, 0x6132, 0x6150, 0x61a0, 0x61a1];
 
 /// Reads a device.
@@ -81,7 +81,7 @@ pub fn draft(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Re
     Ok(Draft { node, objects: found })
 }
 
-/// The objects to read: those of the EDS, else those of the standard and of the profile.
+/// Returns the objects to read: from the EDS, else from the standard and the profile.
 fn candidates(node: &Node) -> BTreeSet<ObjectId> {
     let mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);
     let mut all: BTreeSet<ObjectId> = mapped.filter(|object| object.index >= 0x20).collect();

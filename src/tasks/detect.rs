@@ -26,7 +26,7 @@ const ENOUGH_FRAMES: u32 = 3;
 /// A bit rate is rejected after this many errors without a valid frame.
 const ENOUGH_ERRORS: u32 = 50;
 
-/// The most bits that a request occupies on the bus, with bit stuffing.
+/// The maximum number of bits of a request on the bus, with bit stuffing.
 const REQUEST_BITS: u64 = 135;
 
 /// How a bit rate was tried.
@@ -91,9 +91,8 @@ pub struct Detection {
 
 /// Tries the usual bit rates, the present one first, each for `time_per_rate`. Then restores the interface.
 ///
-/// First it only listens. If
-/// `ask` is set and no frame is received, it sends requests, which disturbs a bus with another bit rate. `on_tried`
-/// receives the result of each try.
+/// First it only listens. If `ask` is set and no frame is received, it sends requests. They disturb a bus that has
+/// another bit rate. `on_tried` receives the result of each try.
 ///
 /// # Errors
 /// The interface cannot be set or restored; Ctrl-C.
@@ -103,13 +102,13 @@ pub fn detect(
     time_per_rate: Duration,
     on_tried: &mut dyn FnMut(&RateResult),
 ) -> Result<Detection, Failure> {
-    bus.can_set_bit_rate().map_err(|error| refused(error, bus.name()))?;
+    bus.can_set_bit_rate().map_err(|error| to_failure(error, bus.name()))?;
     let bit_rate = bus.bit_rate();
     let result =
         bus.listen(&Filters::All).map_err(Error::from).and_then(|()| try_all(bus, ask, time_per_rate, on_tried));
     let restored = bus.restore_bit_rate();
     let result = result.map_err(|error| match error {
-        Error::Bus(error) => refused(error, bus.name()),
+        Error::Bus(error) => to_failure(error, bus.name()),
         error => error.into(),
     });
     let interface = bus.name().to_owned();
@@ -126,7 +125,7 @@ pub fn detect(
     }
 }
 
-fn refused(error: BusError, name: &str) -> Failure {
+fn to_failure(error: BusError, name: &str) -> Failure {
     not_set(error, HostAction::Detect { interface: name.to_owned() })
 }
 
@@ -167,7 +166,7 @@ fn try_all(
 }
 
 /// Sets a bit rate. If the interface does not support the bit rate, returns false and records the reason.
-fn set(bus: &mut dyn Bus, mode: Mode, tried: &mut RateResult) -> Result<bool, BusError> {
+fn try_set(bus: &mut dyn Bus, mode: Mode, tried: &mut RateResult) -> Result<bool, BusError> {
     match bus.set_bit_rate(tried.bit_rate, mode) {
         Ok(()) => Ok(true),
         Err(BusError::BitRate { why, .. }) => {
@@ -180,7 +179,7 @@ fn set(bus: &mut dyn Bus, mode: Mode, tried: &mut RateResult) -> Result<bool, Bu
 
 fn listen(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<RateResult, Error> {
     let mut tried = RateResult::new(bit_rate, Method::Listening);
-    if !set(bus, Mode::ListenOnly, &mut tried)? {
+    if !try_set(bus, Mode::ListenOnly, &mut tried)? {
         return Ok(tried);
     }
     let until = bus.mono() + time_per_rate;
@@ -199,7 +198,7 @@ fn listen(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<R
 
 fn ask_all(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<RateResult, Error> {
     let mut tried = RateResult::new(bit_rate, Method::Asking);
-    if !set(bus, Mode::Normal, &mut tried)? {
+    if !try_set(bus, Mode::Normal, &mut tried)? {
         return Ok(tried);
     }
     let mut master = Master::new(bus, Timing { timeout: time_per_rate, retries: 0 });

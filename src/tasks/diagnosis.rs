@@ -21,7 +21,7 @@ use std::time::Duration;
 /// The emergency of a node that received a SYNC of an unexpected length.
 const SYNC_LENGTH: u16 = 0x8240;
 
-/// Why a node, or a signal of it, sends no measurements.
+/// Why a node or one of its signals sends no measurements.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Silence {
     /// The cause.
@@ -30,12 +30,12 @@ pub struct Silence {
     pub emergency: Option<u16>,
     /// Whether the node is OPERATIONAL. Reported with uncertain causes, because a node in another state is also silent.
     pub running: Running,
-    /// COB-IDs of frames that may be its TPDOs, although no TPDO of the recorded nodes has them.
+    /// COB-IDs of received frames that may be TPDOs of the node. No known TPDO has these COB-IDs.
     pub unknown_cob_ids: Vec<CanId>,
 }
 
 impl Silence {
-    /// A cause about which nothing else is known.
+    /// Creates a silence without further evidence.
     pub fn of(cause: SilenceCause) -> Silence {
         Silence { cause, emergency: None, running: Running::Unknown, unknown_cob_ids: Vec::new() }
     }
@@ -80,7 +80,7 @@ pub enum SilenceCause {
     },
     /// The heartbeat stopped, and no request was sent since then.
     HeartbeatStopped,
-    /// The length of its TPDOs differs from their mapping, in bytes.
+    /// The length of the received TPDOs differs from the length of the mapping (both in bytes).
     WrongLength {
         /// The length of the mapping.
         mapped: usize,
@@ -174,7 +174,7 @@ pub struct ObservedFrames {
     pub shared: Option<(CanId, [(NodeId, TpdoNumber); 2])>,
 }
 
-/// The way in which measurements were requested.
+/// How measurements were requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RequestContext {
     /// The waiting time.
@@ -221,7 +221,7 @@ pub fn diagnose(
     Silence { emergency: observed.emergency, running, ..Silence::of(cause) }
 }
 
-/// Why no values are decoded from the received TPDOs.
+/// Returns why no values are decoded from the received TPDOs.
 fn frames_cause(node: NodeId, observed: &ObservedFrames) -> SilenceCause {
     match (observed.shared, observed.wrong_length) {
         (Some((id, [(one, first), (other, second)])), _) if one == other => {
@@ -236,7 +236,7 @@ fn frames_cause(node: NodeId, observed: &ObservedFrames) -> SilenceCause {
     }
 }
 
-/// Why a node that may be operational sends no measurements, by the parameters of its TPDOs.
+/// Returns why a node that may be operational sends no measurements, from the parameters of its TPDOs.
 fn setup_cause(
     node: &Node,
     carries: &dyn Fn(&Tpdo) -> bool,
@@ -270,7 +270,7 @@ fn setup_cause(
     cause.map_or(SilenceCause::NoTpdo, |&(number, cause)| SilenceCause::Tpdo(number, cause))
 }
 
-/// Why a valid TPDO is not sent.
+/// Returns why a valid TPDO is not sent.
 fn tpdo_cause(
     node: &Node,
     tpdo: &Tpdo,
@@ -309,7 +309,7 @@ fn tpdo_cause(
     }
 }
 
-/// Why a TPDO with event timer or with transmission on change was not sent.
+/// Returns why a TPDO with event timer or with transmission on change was not sent.
 fn event_cause(node: &Node, tpdo: &Tpdo, findings: &Findings, waited: Duration) -> TpdoCause {
     let inhibit: Option<u16> = findings.unsigned(tpdo.number.communication(3));
     let inhibit = inhibit.filter(|&inhibit| Duration::from_micros(100) * u32::from(inhibit) >= waited);
@@ -324,13 +324,13 @@ fn event_cause(node: &Node, tpdo: &Tpdo, findings: &Findings, waited: Duration) 
     }
 }
 
-/// The cause, if a TPDO starts at a SYNC with a counter that SYNC never has.
+/// Returns a cause if a TPDO starts at a SYNC counter that SYNC never has.
 fn sync_start(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<TpdoCause> {
     let start: u8 = findings.unsigned(tpdo.number.communication(6))?;
     (start > node.sync_overflow.unwrap_or(0)).then_some(TpdoCause::SyncStart(start))
 }
 
-/// The cause, if all channels of a TPDO are off.
+/// Returns a cause if all channels of a TPDO are switched off.
 fn channel_off(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<TpdoCause> {
     let modes: Vec<ObjectId> =
         tpdo.mapping.iter().filter_map(|entry| inquiry::operating_mode(node, entry.object)).collect();
@@ -343,7 +343,8 @@ fn interrupts_disabled(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<
     (findings.is_zero(enable) == Some(true)).then_some(TpdoCause::InterruptsDisabled(enable))
 }
 
-/// The cause, if the deltas and limits of all values of a TPDO were read and are 0. A missing object triggers nothing.
+/// Returns a cause if the deltas and limits of all values of a TPDO were read and are 0. A missing object triggers
+/// nothing.
 fn no_trigger(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<TpdoCause> {
     let values: Vec<[ObjectId; 3]> =
         tpdo.mapping.iter().filter_map(|entry| inquiry::triggers(node, entry.object)).collect();

@@ -1,6 +1,6 @@
 //! Finds out why a node or the whole bus is silent. Changes nothing on the nodes.
 //!
-//! The reasons for silent signals are those of `log` and `check`, from a recording without NMT commands.
+//! Silent signals are diagnosed as in `log` and `check`, from a recording without NMT commands.
 
 use crate::bus::{Fault, Filters, Stamp};
 use crate::canopen::id::NodeId;
@@ -24,10 +24,10 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// The time to listen for nodes before the observation, if nothing may be sent.
-const LISTEN: Duration = Duration::from_secs(3);
+const LISTEN_TIME: Duration = Duration::from_secs(3);
 
 /// The time to observe heartbeats and TPDOs. `log` reports the reasons of silent nodes after the same time.
-const OBSERVATION: Duration = Duration::from_secs(5);
+const OBSERVATION_TIME: Duration = Duration::from_secs(5);
 
 /// The options of an examination.
 #[derive(Clone, Debug)]
@@ -38,7 +38,7 @@ pub struct DoctorOptions {
     pub passive: bool,
     /// Whether the bus may be searched for devices without a node-ID by LSS, if no node answers.
     pub lss: bool,
-    /// The wait after the last request of the scan.
+    /// The waiting time after the last request of the scan.
     pub timeout: Duration,
     /// The number of requests to a node that does not answer.
     pub rounds: u32,
@@ -62,7 +62,7 @@ pub struct Finding {
 pub enum FindingCause {
     /// A request failed.
     Failed(Box<Failure>),
-    /// No node sends measurements for this reason.
+    /// The node or the signal sends no measurements for this reason.
     Silent(Box<Silence>),
     /// No frame was received within this time.
     NoFrame(Duration),
@@ -152,7 +152,7 @@ fn examine_bus(master: &mut Master<'_>, options: &DoctorOptions, examination: &m
     let asked: Vec<NodeId> = options.node.map_or_else(|| NodeId::all().collect(), |node| vec![node]);
     master.listen(&Filters::All)?;
     let mut presence = if options.passive {
-        scan::listen(master, LISTEN)?
+        scan::listen(master, LISTEN_TIME)?
     } else {
         scan::find(master, &asked, options.timeout, options.rounds)?
     };
@@ -173,7 +173,7 @@ fn examine_bus(master: &mut Master<'_>, options: &DoctorOptions, examination: &m
     if options.passive { Ok(()) } else { read_values(master, options, &answering, examination) }
 }
 
-/// The problem of a node that sends frames but does not answer.
+/// Returns the problem of a node that sends frames but does not answer.
 fn only_heartbeat(state: Option<NmtState>) -> FindingCause {
     match state {
         Some(NmtState::Stopped) => FindingCause::Silent(Box::new(not_operational(NmtState::Stopped))),
@@ -182,7 +182,7 @@ fn only_heartbeat(state: Option<NmtState>) -> FindingCause {
     }
 }
 
-/// The problem of a node whose heartbeat shows a state other than OPERATIONAL.
+/// Returns the problem of a node whose heartbeat shows this state (not OPERATIONAL).
 fn not_operational(state: NmtState) -> Silence {
     let cause = SilenceCause::NotOperational { state, by: Proof::Heartbeat, was_started: false };
     Silence::of(cause)
@@ -193,7 +193,7 @@ fn is_stopped(error: &SdoError) -> bool {
     matches!(error.failure, SdoFailure::NoAnswer { missed: MissedAnswer { state: Some(NmtState::Stopped), .. }, .. })
 }
 
-/// Why nothing was received from the requested nodes.
+/// Finds out why nothing was received from the requested nodes.
 fn why_absent(
     master: &mut Master<'_>,
     options: &DoctorOptions,
@@ -226,7 +226,7 @@ fn why_absent(
             examination.add(Some(node), FindingCause::Absent(others.into_iter().collect()));
         }
         _ if !faults.is_empty() => {}
-        _ if is_alone => examination.add(None, FindingCause::NoFrame(OBSERVATION)),
+        _ if is_alone => examination.add(None, FindingCause::NoFrame(OBSERVATION_TIME)),
         _ => examination.add(None, FindingCause::NoNode),
     }
     Ok(())
@@ -260,7 +260,7 @@ fn record(
         nodes: nodes.to_vec(),
         wanted: Vec::<Wanted>::new(),
         mode: if options.passive { Mode::Passive } else { Mode::AsSent },
-        duration: Some(OBSERVATION),
+        duration: Some(OBSERVATION_TIME),
         count: None,
         nmt: false,
         start_all: false,
@@ -280,15 +280,15 @@ fn record(
     };
     // The nodes have sent frames before. So a recording without TPDOs only means that no TPDO was received.
     let nothing = report.nothing.filter(|failure| {
-        let is_unheard = matches!(failure.cause, Cause::Log(LogFailure::NothingReceived { .. }));
-        for &node in nodes.iter().filter(|_| is_unheard) {
+        let received_nothing = matches!(failure.cause, Cause::Log(LogFailure::NothingReceived { .. }));
+        for &node in nodes.iter().filter(|_| received_nothing) {
             let state = presence.state(node).filter(|&state| state != NmtState::Operational);
             examination.add(
                 Some(node),
                 state.map_or(FindingCause::NoTpdo, |state| FindingCause::Silent(Box::new(not_operational(state)))),
             );
         }
-        !is_unheard
+        !received_nothing
     });
     if report.interrupted {
         return Err(Error::Interrupted.into());

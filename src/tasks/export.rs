@@ -1,4 +1,4 @@
-//! The contents of TPDOs for other programs: bits, factor, offset and unit of each signal.
+//! Exports the contents of TPDOs for other programs: bits, factor, offset and unit of each signal.
 
 use super::Failure;
 use crate::canopen::id::{CanId, NodeId};
@@ -92,7 +92,7 @@ fn message(node: &Node, tpdo: &Tpdo) -> Message {
         let name = signal.map(|signal| signal.name.clone()).or(status.map(|signal| format!("{}.status", signal.name)));
         let unit = signal.map_or_else(|| layout.unit_of(object), |signal| signal.unit);
         match data_type.zip(reading.scale()) {
-            // Objects below 20h are gaps.
+            // Objects below 20h only fill gaps in the mapping.
             _ if object.index < 0x20 => {}
             Some((data_type, scale)) => {
                 let name = name.unwrap_or_else(|| layout.name_of(object));

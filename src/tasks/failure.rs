@@ -18,7 +18,7 @@ use crate::node::{self, Node};
 use std::fmt;
 use std::sync::Arc;
 
-/// The kinds of failure that scripts can distinguish. Each has one exit code.
+/// The kinds of failure that scripts can distinguish. Each kind has its own exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// A check failed, or a safety check stopped the command before it changed anything.
@@ -65,7 +65,7 @@ pub enum Cause {
     LssService(Arc<LssError>),
     /// Reading or writing a node failed.
     Node(Arc<node::Error>),
-    /// An interface of this computer was not set.
+    /// A CAN interface of this computer could not be set.
     Host(host::HostFailure),
     /// The user stopped the command (Ctrl-C, SIGTERM, SIGHUP).
     Interrupted,
@@ -173,7 +173,7 @@ fn node_kind(error: &node::Error) -> Kind {
     }
 }
 
-/// The kind of an LSS error.
+/// Returns the kind of an LSS error.
 pub(super) fn lss_kind(error: &LssError) -> Kind {
     match error {
         LssError::Master(Error::Bus(BusError::File { .. } | BusError::Recording { .. })) => Kind::Io,
@@ -197,24 +197,24 @@ fn changes_slave(service: Service) -> bool {
 }
 
 impl Failure {
-    /// A failure that does not belong to a single node.
+    /// Creates a failure that does not belong to a single node.
     pub fn general(cause: impl Into<Cause>) -> Failure {
         Failure { node: None, object: None, cause: cause.into(), effects: Vec::new() }
     }
 
-    /// A failure of one node.
+    /// Creates a failure of one node.
     pub fn at(node: NodeId, cause: impl Into<Cause>) -> Failure {
         Failure { node: Some(node), ..Failure::general(cause) }
     }
 
-    /// The same failure with the object that was read or written.
+    /// Adds the object that was read or written.
     #[must_use]
     pub fn of_object(mut self, object: ObjectId) -> Failure {
         self.object = Some(object);
         self
     }
 
-    /// The same failure with one more effect on `node`.
+    /// Adds an effect on `node`.
     #[must_use]
     pub fn with(mut self, node: NodeId, effect: impl Into<Effect>) -> Failure {
         self.node.get_or_insert(node);
@@ -222,7 +222,7 @@ impl Failure {
         self
     }
 
-    /// The same failure of a write. If the device rejected the number, the violated rule of the description is added.
+    /// Adds the violated rule of the description, if the device rejected the written number.
     #[must_use]
     pub fn explained(self, node: &Node, object: ObjectId, data: &[u8]) -> Failure {
         match self.abort().and_then(|_| Rule::broken(node, object, data)) {
@@ -277,7 +277,7 @@ impl fmt::Display for Failure {
 
 impl std::error::Error for Failure {}
 
-/// The cause of an area as a [`Cause`].
+/// Converts the cause of an area to a [`Cause`].
 macro_rules! causes {
     ($($variant:ident($cause:ty);)+) => {
         $(impl From<$cause> for Cause {

@@ -1,7 +1,7 @@
-//! The figures of a running bus: load, faults, heartbeat intervals and SDO answer times.
+//! Measures a running bus: load, faults, heartbeat intervals and SDO answer times.
 //!
-//! Frames are interpreted as in [`super::monitor`]. The reads of this program are counted like those
-//! of other masters.
+//! Frames are interpreted as in [`super::monitor`]. The reads of this program are counted like the reads of other
+//! masters.
 
 mod figures;
 mod load;
@@ -35,7 +35,7 @@ const READ_SHARE: f64 = 0.05;
 /// The length of a request and its answer in bits.
 const READ_BITS: f64 = 270.0;
 
-/// A bit rate for the interval of the reads, if the real one is unknown.
+/// The bit rate used to compute the read interval if the real bit rate is unknown.
 const ASSUMED_BIT_RATE: u32 = 125_000;
 
 /// What is measured, and for how long.
@@ -148,7 +148,7 @@ impl HealthObserver<'_> {
         self.count_entries();
     }
 
-    /// The node that sent a frame; `None` for masters.
+    /// Returns the node that sent a frame; `None` for masters.
     fn sender(&self, frame: &Frame, kind: FrameKind) -> Option<NodeId> {
         if frame.is_remote() || matches!(kind, FrameKind::Nmt | FrameKind::Other) {
             return None;
@@ -160,7 +160,7 @@ impl HealthObserver<'_> {
         if matches!(last.content, Content::Pdo(_, true)) { None } else { last.node }
     }
 
-    /// The figures of a node that is reported.
+    /// Returns the figures of a node; `None` if the node is not reported.
     fn tally(&mut self, node: NodeId) -> Option<&mut NodeTally> {
         let is_reported = self.options.nodes.is_empty() || self.options.nodes.contains(&node);
         is_reported.then(|| self.health.nodes.entry(node).or_default())
@@ -189,7 +189,7 @@ impl HealthObserver<'_> {
             return;
         }
         self.pending.push((master.start(Request::read(node, object).once()), node));
-        // A bus does not return the frames that this program sends.
+        // The bus does not return frames of this program, so the request is counted here.
         let at = master.bus().now();
         self.on_frame(&Received { frame: Upload::new(node, object, false).request(), at });
     }

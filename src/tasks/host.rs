@@ -59,7 +59,7 @@ impl HostFailure {
     }
 }
 
-/// The failure of an action on an interface.
+/// Converts the error of an action on an interface to a failure.
 pub fn not_set(error: BusError, action: HostAction) -> Failure {
     match error {
         BusError::Permission(what) => Failure::general(HostFailure::NotPermitted { what, action }),

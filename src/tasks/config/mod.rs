@@ -48,7 +48,7 @@ pub enum File {
 }
 
 impl File {
-    /// The contents for one device, and notes about settings that the device lacks.
+    /// Returns the contents for one device, and notes about settings that the device lacks.
     pub fn document(&self, snapshot: &Snapshot) -> (Document, Vec<Note>) {
         match self {
             File::Settings(document) => (document.clone(), Vec::new()),
@@ -90,7 +90,7 @@ impl Snapshot {
     /// Checks a file against the device.
     ///
     /// # Errors
-    /// Every mistake, in the order of the places.
+    /// All mistakes, in the order of their places in the file.
     pub fn check(&self, document: &Document) -> Result<FileSettings, Vec<Mistake>> {
         check(document, &self.node, &self.settings, Some(self))
     }

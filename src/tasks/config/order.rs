@@ -8,8 +8,8 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::tasks::pdo;
 
-/// The settings of one stage in the order of writing. Guarding is switched off before heartbeat is switched on, and a
-/// lower limit never exceeds the upper limit.
+/// Sorts the settings of one stage in the order of writing. Guarding is switched off before heartbeat is switched on,
+/// and a lower limit never exceeds the upper limit.
 pub(super) fn sorted(mut group: Vec<Wanted>, now: &Snapshot) -> Vec<Wanted> {
     let number = |wanted: &Wanted, content: &Content| match content {
         Content::Bytes(bytes) => wanted.setting.data_type.decode(bytes).as_ref().ok().and_then(Value::as_f64),
@@ -29,7 +29,7 @@ pub(super) fn sorted(mut group: Vec<Wanted>, now: &Snapshot) -> Vec<Wanted> {
     group
 }
 
-/// The settings of a TPDO after the values of a file are applied.
+/// Returns the settings of a TPDO after the values of a file are applied.
 pub(super) fn tpdo_settings(old: &pdo::Settings, group: &[Wanted]) -> pdo::Settings {
     let mut new = old.clone();
     for wanted in group {
@@ -57,10 +57,10 @@ pub(super) fn tpdo_settings(old: &pdo::Settings, group: &[Wanted]) -> pdo::Setti
     new
 }
 
-/// Bit 31 of 1014h and bit 30 of 1005h must not be in use while the identifier changes.
-const IN_USE: [(u16, u32, bool); 2] = [(0x1014, 1 << 31, true), (0x1005, 1 << 30, false)];
+/// Services must be off while their identifier changes: index, bit, and the value of the bit that means "off".
+const OFF_BITS: [(u16, u32, bool); 2] = [(0x1014, 1 << 31, true), (0x1005, 1 << 30, false)];
 
-/// The differing words of COB-ID objects, with the steps to change each word.
+/// Returns the COB-ID objects that change, each with the words to write one after the other.
 pub(super) fn service_words(group: &[Wanted], now: &Snapshot) -> Vec<(ObjectId, Vec<u32>)> {
     let mut words: Vec<(ObjectId, Vec<u32>)> = Vec::new();
     for wanted in group {
@@ -87,9 +87,10 @@ pub(super) fn service_words(group: &[Wanted], now: &Snapshot) -> Vec<(ObjectId, 
         if new == old {
             continue;
         }
-        let moves = (new ^ old) & 0x1fff_ffff != 0;
-        let idle = IN_USE.iter().find(|(index, ..)| *index == object.index && moves);
-        let first = idle.map(|(_, bit, set)| if *set { old | bit } else { old & !bit }).filter(|first| *first != old);
+        let id_changes = (new ^ old) & 0x1fff_ffff != 0;
+        let off_bit = OFF_BITS.iter().find(|(index, ..)| *index == object.index && id_changes);
+        let first =
+            off_bit.map(|(_, bit, set)| if *set { old | bit } else { old & !bit }).filter(|first| *first != old);
         words.push((object, first.into_iter().chain([new]).collect()));
     }
     words

@@ -25,7 +25,7 @@ pub enum Problem {
         /// The message of the parser.
         message: String,
     },
-    /// No device has such a key, or this device does not have it.
+    /// The key does not exist, or this device does not have it.
     UnknownKey {
         /// The title of the device, if the key is only missing there.
         device: Option<String>,
@@ -49,9 +49,9 @@ pub enum Problem {
         /// The text.
         text: String,
     },
-    /// The duration is not a multiple of the step of the device, in microseconds.
+    /// The duration is not a multiple of the step of the device.
     DurationStep {
-        /// The step.
+        /// The step in microseconds.
         tick: u32,
     },
     /// Not a unit.
@@ -73,7 +73,7 @@ pub enum Problem {
         /// The unit of the signal.
         to: Unit,
     },
-    /// The number has more decimal digits than the integer.
+    /// The number has more decimal digits than the device.
     TooFine {
         /// The decimal digits.
         digits: u8,
@@ -128,12 +128,12 @@ pub enum Problem {
         /// The text.
         text: String,
     },
-    /// More bits than a frame has.
+    /// The mapping has more bits than a frame.
     Bits {
         /// The bits.
         bits: u32,
     },
-    /// More entries than the device has.
+    /// The mapping has more entries than the device supports.
     Entries {
         /// The number of entries of the device.
         high: String,
@@ -152,7 +152,7 @@ pub enum Problem {
         /// The column.
         column: String,
     },
-    /// The value is fixed.
+    /// The value cannot be changed.
     Fixed {
         /// The value of the device; `None` if it is unknown.
         present: Option<Item>,

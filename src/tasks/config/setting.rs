@@ -33,7 +33,7 @@ pub struct Setting {
 /// How the values of a setting are written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
-    /// As the type of the object.
+    /// As a value of the type of the object.
     Plain,
     /// A hexadecimal integer.
     Hex,
@@ -43,7 +43,7 @@ pub enum Form {
     Unit(Option<usize>),
     /// A number in the unit of the signal with this number.
     Quantity(usize, Scale),
-    /// A word for some of the numbers.
+    /// A word, if the number has one.
     Words(Vec<(u64, String)>),
     /// The transmission type of a TPDO. The number is the type for the event timer.
     Transmission(u8),
@@ -59,7 +59,7 @@ pub enum Form {
     BitRate,
 }
 
-/// The kind of conversion of a number if the unit of its signal changes.
+/// How a number is converted if the unit of its signal changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
     /// A point on the scale.
@@ -122,7 +122,7 @@ const CHANNEL: [(u16, &str, Stage); 20] = [
 /// Objects of CiA 301 that a device without a description may have.
 const COMMUNICATION: [u16; 9] = [0x1005, 0x1006, 0x100c, 0x100d, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
 
-/// The settings that a node can have, in the order of a file.
+/// Returns the settings that a node can have, in the order of a file.
 pub fn settings(node: &Node) -> Vec<Setting> {
     let entries = candidates(node);
     let present: BTreeSet<ObjectId> = entries.iter().map(|entry| entry.object).collect();
@@ -136,7 +136,7 @@ pub fn settings(node: &Node) -> Vec<Setting> {
     ranked.into_iter().map(|(_, setting)| setting).collect()
 }
 
-/// The entries that may be settings: those of the description or EDS, else those of the standards.
+/// Returns the entries that may be settings: from the description or EDS, else from the standards.
 fn candidates(node: &Node) -> Vec<Entry> {
     if let Some(model) = node.model.as_ref().filter(|model| !model.dictionary.is_empty()) {
         return model.dictionary.iter().cloned().collect();
@@ -220,7 +220,7 @@ impl Catalog<'_> {
     fn is_setting(&self, entry: &Entry) -> bool {
         let object = entry.object;
         let described = self.node.described(object);
-        let acts = described.is_some_and(|entry| entry.signature.is_some());
+        let has_signature = described.is_some_and(|entry| entry.signature.is_some());
         let methods = self.node.model.as_ref().map_or(&[][..], |model| &model.description.assign);
         let assigned = |place: Option<crate::device::assign::AssignObject>| {
             place.is_some_and(|place| place.object.index == object.index)
@@ -233,7 +233,7 @@ impl Catalog<'_> {
         let sets = described.and_then(|entry| entry.signature) == Some(Signature::Set);
         entry.access.is_readable()
             && entry.access.is_writable()
-            && !(acts || sets || is_assigned || is_elsewhere || entry.pdo)
+            && !(has_signature || sets || is_assigned || is_elsewhere || entry.pdo)
             && entry.data_type != DataType::Domain
     }
 
@@ -256,8 +256,8 @@ impl Catalog<'_> {
         self.setting(entry, format!("object.{name}"), form, Stage::Object)
     }
 
-    /// The signal that an object of CiA 404 belongs to, with the name of the setting. `None` if the same setting is in
-    /// another family.
+    /// Returns the signal of a CiA 404 object, with the name and stage of the setting. Returns `None` if an object of
+    /// another family contains the same setting.
     fn channel(&self, object: ObjectId) -> Option<(usize, &'static str, Stage)> {
         let low = object.index & 0x0fff;
         let &(_, name, stage) = CHANNEL.iter().find(|(known, ..)| *known == low)?;
@@ -320,7 +320,7 @@ impl Catalog<'_> {
         rows.into_iter().filter(|(_, object, ..)| self.node.may_have(*object)).map(setting).collect()
     }
 
-    /// The position of the section of a setting, and the position within the section.
+    /// Returns the position of a setting in a file: by section, then within the section.
     fn rank(&self, setting: &Setting) -> usize {
         let section = setting.key.split('.').next().unwrap_or_default();
         let sections = ["address", "node", "signal", "tpdo", "object", "calibration"];
@@ -337,7 +337,7 @@ impl Catalog<'_> {
     }
 }
 
-/// The default identifier of a TPDO: of the description, else of the predefined connection set.
+/// Returns the default identifier of a TPDO: from the description, else from the predefined connection set.
 pub(super) fn default_id(node: &Node, number: TpdoNumber) -> u16 {
     let entry = node.model.as_ref().and_then(|model| model.dictionary.get(number.communication(1)));
     let word = entry.and_then(|entry| entry.default_bytes(node.id)).and_then(|bytes| bytes.try_into().ok());
@@ -349,7 +349,7 @@ pub(super) fn default_id(node: &Node, number: TpdoNumber) -> u16 {
     u16::try_from(described.unwrap_or(predefined)).unwrap_or(0)
 }
 
-/// The microseconds of a unit of time.
+/// Returns the microseconds of a unit of time.
 fn tick(unit: &str) -> Option<u32> {
     match unit {
         "us" => Some(1),
@@ -360,7 +360,7 @@ fn tick(unit: &str) -> Option<u32> {
     }
 }
 
-/// The words for filter types: the first word of each meaning, if no other number has it.
+/// Returns the words for filter types: the first word of each meaning, if no other filter type has it.
 fn filter_words(node: &Node, signal: &Signal) -> Vec<(u64, String)> {
     let described = node.described(ObjectId::new(0x61a0, signal.channel)).map(|entry| &entry.values);
     let codes: Vec<u64> = match described.filter(|values| !values.is_empty()) {

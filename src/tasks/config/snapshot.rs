@@ -58,7 +58,7 @@ impl Snapshot {
         Ok(snapshot)
     }
 
-    /// The value of a setting; `None` if the device does not have it.
+    /// Returns the value of a setting; `None` if the device does not have it.
     pub fn content(&self, setting: &Setting) -> Option<Content> {
         let word = || {
             let bytes = self.values.get(&setting.object)?;
@@ -125,7 +125,7 @@ impl Snapshot {
         Some(self.content(setting)? == self.default(setting)?)
     }
 
-    /// The factory default of a setting, if a description or EDS contains it without a doubt.
+    /// Returns the factory default of a setting, if a description or EDS contains it without a `doubt`.
     pub fn default(&self, setting: &Setting) -> Option<Content> {
         let default = |object: ObjectId| {
             let is_doubtful = self.node.described(object).is_some_and(|entry| !entry.doubt.is_empty());
@@ -145,7 +145,7 @@ impl Snapshot {
                 let words: Vec<u32> = (1..=count).map(entry).collect::<Option<_>>()?;
                 Some(Content::Mapping(words.into_iter().map(crate::canopen::pdo::MappingEntry::from_word).collect()))
             }
-            // A default is a number in the default unit.
+            // The default holds only if unit and digits have their defaults.
             Form::Quantity(signal, _) => {
                 let channel = self.node.signals.get(*signal)?.channel;
                 let has_default = |low| {
@@ -153,15 +153,15 @@ impl Snapshot {
                     self.values.get(&object).is_none_or(|bytes| default(object).as_ref() == Some(bytes))
                 };
                 let is_integer = !matches!(setting.data_type, DataType::Real32 | DataType::Real64);
-                let is_usual = has_default(0x6131) && (!is_integer || has_default(0x6132));
-                default(setting.object).filter(|_| is_usual).map(Content::Bytes)
+                let has_default_scale = has_default(0x6131) && (!is_integer || has_default(0x6132));
+                default(setting.object).filter(|_| has_default_scale).map(Content::Bytes)
             }
             _ => default(setting.object).map(Content::Bytes),
         }
     }
 }
 
-/// Objects that are read besides the settings: units and digits, bit rate, range, reference, dates.
+/// Returns the objects that are read in addition to the settings: units and digits, bit rate, range, reference, dates.
 fn extra_objects(node: &Node) -> Vec<(ObjectId, DataType)> {
     let mut objects = Vec::new();
     for signal in &node.signals {
@@ -175,7 +175,7 @@ fn extra_objects(node: &Node) -> Vec<(ObjectId, DataType)> {
     objects.into_iter().map(|object| (object, node.data_type(object))).collect()
 }
 
-/// The bytes of objects, and those that the device refuses.
+/// The bytes of the objects, and the objects that the device refuses to read.
 type Values = (BTreeMap<ObjectId, Vec<u8>>, Vec<(ObjectId, AbortCode)>);
 
 fn read_objects(master: &mut Master<'_>, node: &Node, objects: &[(ObjectId, DataType)]) -> Result<Values, Failure> {
@@ -208,14 +208,14 @@ fn read_objects(master: &mut Master<'_>, node: &Node, objects: &[(ObjectId, Data
     Ok((values, unreadable))
 }
 
-/// The bit rate setting of the device, if an object contains its code.
+/// Returns the bit rate setting of the device, if an object contains its code.
 fn bit_rate(node: &Node, values: &BTreeMap<ObjectId, Vec<u8>>) -> Option<u32> {
     let model = node.model.as_ref()?;
     let code = *values.get(&model.dictionary.find("bit-rate")?.object)?.first()?;
     model.description.bit_rates_of(AssignKind::Objects).get(&code).copied()
 }
 
-/// Updates units and digits.
+/// Updates the units and digits of the signals.
 pub(super) fn renew_signals(node: &mut Node, values: &BTreeMap<ObjectId, Vec<u8>>) {
     for signal in &mut node.signals {
         let bytes = |index: u16| values.get(&ObjectId::new(index, signal.channel));

@@ -42,7 +42,7 @@ pub struct SignalScale {
 }
 
 impl Scales {
-    /// The present units and digits of a node.
+    /// Returns the present units and digits of a node.
     pub fn of(node: &Node) -> Scales {
         let scale = |signal: &crate::measure::layout::Signal| SignalScale {
             unit: signal.unit,
@@ -58,7 +58,7 @@ impl Scales {
 }
 
 impl Setting {
-    /// A value in the form of a file.
+    /// Converts a value to the form of a file.
     pub fn show(&self, node: &Node, scales: &Scales, content: &Content) -> Item {
         let number = match content {
             Content::Number(number) => u64::from(*number),
@@ -73,7 +73,7 @@ impl Setting {
         let text = |text: String| Item::Text(text);
         match &self.form {
             Form::Hex => text(format!("0x{number:X}")),
-            Form::Duration(tick) => text(duration(number, *tick)),
+            Form::Duration(tick) => text(duration_text(number, *tick)),
             Form::Unit(_) => {
                 text(u32::try_from(number).map_or_else(|_| number.to_string(), |code| unit_text(Unit(code))))
             }
@@ -124,7 +124,8 @@ impl Setting {
         }
     }
 
-    /// A value of a file in the form of the device. `None` if this depends on a unit or digits that are still unknown.
+    /// Converts a value of a file to the form of the device. Returns `None` if the unit or digits it depends on are
+    /// unknown.
     ///
     /// # Errors
     /// The value has another form, does not fit, or its unit cannot be converted.
@@ -136,7 +137,7 @@ impl Setting {
             Form::Hex => self.integer(number_of(item).ok_or_else(|| wrong("a number (0x180)"))?).map(Some),
             Form::Duration(tick) => {
                 let Item::Text(text) = item else { return Err(wrong("a duration in quotes (\"100ms\")")) };
-                self.integer(counts(text, *tick)?).map(Some)
+                self.integer(parse_ticks(text, *tick)?).map(Some)
             }
             Form::Unit(signal) => {
                 let Item::Text(text) = item else { return Err(wrong("a unit in quotes (\"bar\")")) };
@@ -260,12 +261,12 @@ impl Setting {
     }
 }
 
-/// The unit in the form of a file: its symbol, or its code.
+/// Returns the symbol of a unit, or its code if it has no symbol.
 fn unit_text(unit: Unit) -> String {
     unit.to_string()
 }
 
-/// A number that is written as an integer or as text.
+/// Parses a number that is written as an integer or as text.
 fn number_of(item: &Item) -> Option<i128> {
     match item {
         Item::Integer(number) => Some(*number),
@@ -277,8 +278,8 @@ fn number_of(item: &Item) -> Option<i128> {
     }
 }
 
-/// A count of `tick` microseconds as a duration.
-fn duration(count: u64, tick: u32) -> String {
+/// Formats a number of ticks as a duration. A tick is `tick` microseconds.
+fn duration_text(count: u64, tick: u32) -> String {
     let microseconds = u128::from(count) * u128::from(tick);
     match microseconds {
         whole if whole.is_multiple_of(1000) => format!("{}ms", whole / 1000),
@@ -286,8 +287,8 @@ fn duration(count: u64, tick: u32) -> String {
     }
 }
 
-/// A duration as a count of `tick` microseconds.
-fn counts(text: &str, tick: u32) -> Result<i128, Problem> {
+/// Parses a duration, and returns the number of ticks. A tick is `tick` microseconds.
+fn parse_ticks(text: &str, tick: u32) -> Result<i128, Problem> {
     let duration = humantime::parse_duration(text).map_err(|_| Problem::NotADuration { text: text.to_owned() })?;
     let tick_nanos = 1000 * u128::from(tick);
     if !duration.as_nanos().is_multiple_of(tick_nanos) {

@@ -8,16 +8,16 @@ use crate::tasks::failure::Cause;
 use crate::tasks::host::HostFailure;
 use std::collections::VecDeque;
 
-const EACH: Duration = Duration::from_millis(1500);
+const TIME_PER_RATE: Duration = Duration::from_millis(1500);
 
 /// An interface, and one device with one heartbeat per second.
 struct Wire {
     now: Mono,
     /// The bit rate of the device.
     device: u32,
-    /// Whether it sends a heartbeat.
+    /// Whether the device sends a heartbeat.
     heartbeat: bool,
-    /// Whether it answers SDO.
+    /// Whether the device answers SDO requests.
     answers: bool,
     /// Whether a third node is connected, which acknowledges frames.
     third_node: bool,
@@ -29,7 +29,7 @@ struct Wire {
     refusal: Option<fn() -> BusError>,
     interrupt: Option<Mono>,
     set: Option<(u32, Mode)>,
-    waiting: VecDeque<Event>,
+    pending_events: VecDeque<Event>,
     sent: Vec<(u32, Frame)>,
     log: Vec<String>,
 }
@@ -47,7 +47,7 @@ impl Wire {
             refusal: None,
             interrupt: None,
             set: None,
-            waiting: VecDeque::new(),
+            pending_events: VecDeque::new(),
             sent: Vec::new(),
             log: Vec::new(),
         }
@@ -79,7 +79,7 @@ impl BitRateControl for Wire {
             return Err(BusError::Unsupported("can9 has no listen-only mode".into()));
         }
         self.set = Some((bit_rate, mode));
-        self.waiting.clear();
+        self.pending_events.clear();
         self.log.push(format!("{bit_rate} {mode:?}"));
         Ok(())
     }
@@ -116,13 +116,13 @@ impl Bus for Wire {
         self.sent.push((self.device, *frame));
         let answer = "585#4300100094010200".parse().unwrap();
         if self.answers && frame.to_string().starts_with("605#") {
-            self.waiting.push_back(Event::Frame(Received { frame: answer, at: self.stamp() }));
+            self.pending_events.push_back(Event::Frame(Received { frame: answer, at: self.stamp() }));
         }
         Ok(())
     }
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
-        if let Some(event) = self.waiting.pop_front() {
+        if let Some(event) = self.pending_events.pop_front() {
             return Ok(event);
         }
         let second = Duration::from_secs(1);
@@ -147,7 +147,7 @@ impl Bus for Wire {
 }
 
 fn run(wire: &mut Wire, ask: bool) -> Result<Detection, Failure> {
-    detect(wire, ask, EACH, &mut |_| ())
+    detect(wire, ask, TIME_PER_RATE, &mut |_| ())
 }
 
 #[test]
@@ -166,10 +166,10 @@ fn listening_finds_the_bit_rate_and_restores_the_interface() {
 #[test]
 fn no_bit_rate_without_evidence() {
     // An unusual bit rate; a silent device; a lone device, whose frames no node acknowledges.
-    let mut strange = Wire::at(83_333);
+    let mut unusual = Wire::at(83_333);
     let mut silent = Wire { heartbeat: false, ..Wire::at(125_000) };
     let mut alone = Wire { third_node: false, ..Wire::at(125_000) };
-    for (wire, errors) in [(&mut strange, true), (&mut silent, false), (&mut alone, true)] {
+    for (wire, errors) in [(&mut unusual, true), (&mut silent, false), (&mut alone, true)] {
         let found = run(wire, false).unwrap();
         assert_eq!((found.found, found.tried.len()), (None, RATES.len()));
         assert_eq!(found.tried.iter().any(|tried| tried.errors > 0), errors);

@@ -33,7 +33,7 @@ impl Findings {
         self.values.get(&object).map(|bytes| bytes.iter().all(|&byte| byte == 0))
     }
 
-    /// The number in an object of one or two bytes; `None` if it was not read.
+    /// Returns the number in an object of one or two bytes; `None` if the object was not read.
     pub(super) fn unsigned<T: TryFrom<u32>>(&self, object: ObjectId) -> Option<T> {
         let bytes = self.values.get(&object)?;
         let number = bytes.iter().take(2).rev().fold(0u32, |number, &byte| number << 8 | u32::from(byte));
@@ -41,7 +41,7 @@ impl Findings {
     }
 }
 
-/// The objects to read of a node, to find out why these TPDOs are not sent.
+/// Returns the objects to read in order to find out why these TPDOs are not sent.
 pub fn objects_to_read(node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Vec<ObjectId> {
     let mut objects = vec![ObjectId::DEVICE_TYPE];
     let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
@@ -69,25 +69,25 @@ pub fn objects_to_read(node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Vec<Obje
     objects
 }
 
-/// The channel of a process value of CiA 404.
+/// Returns the channel of a process value of CiA 404.
 fn channel(node: &Node, value: ObjectId) -> Option<u8> {
     let signal = node.signals.iter().find(|signal| signal.is_value(value))?;
     (signal.channel > 0).then_some(signal.channel)
 }
 
-/// The operating mode (6112h) of the channel of a process value: 0 switches it off.
+/// Returns the operating mode object (6112h) for a process value. Mode 0 switches the channel off.
 pub(super) fn operating_mode(node: &Node, value: ObjectId) -> Option<ObjectId> {
     channel(node, value).map(|channel| ObjectId::new(0x6112, channel))
 }
 
-/// Delta, lower limit and upper limit (x133h to x135h) of a process value.
+/// Returns delta, lower limit and upper limit (x133h to x135h) of a process value.
 pub(super) fn triggers(node: &Node, value: ObjectId) -> Option<[ObjectId; 3]> {
     channel(node, value)?;
     let is_family = PROCESS_VALUES.iter().any(|&(index, _)| index == value.index);
     is_family.then(|| [3, 4, 5].map(|offset| ObjectId::new(value.index + offset, value.sub)))
 }
 
-/// The object that enables a CiA 401 device to send its analogue inputs (6423h).
+/// Returns the object that enables a CiA 401 device to send its analogue inputs (6423h).
 pub(super) fn interrupt_enable(node: &Node, value: ObjectId) -> Option<ObjectId> {
     let is_input = matches!(value.index, 0x6400..=0x6404);
     (is_input && node.identity.profile() == Some(profiles::GENERIC_IO)).then_some(ObjectId::new(0x6423, 0))
@@ -95,20 +95,20 @@ pub(super) fn interrupt_enable(node: &Node, value: ObjectId) -> Option<ObjectId>
 
 /// Reads objects of silent nodes, without waiting for the answers.
 pub struct Inquiry {
-    open: BTreeMap<Ticket, (NodeId, ObjectId)>,
+    pending: BTreeMap<Ticket, (NodeId, ObjectId)>,
     findings: BTreeMap<NodeId, Findings>,
 }
 
 impl Inquiry {
     /// Starts the reads.
     pub fn begin(master: &mut Master<'_>, asked: &[(NodeId, Vec<ObjectId>)]) -> Inquiry {
-        let mut open = BTreeMap::new();
+        let mut pending = BTreeMap::new();
         for (node, objects) in asked {
             for &object in objects {
-                open.insert(master.start(Request::read(*node, object)), (*node, object));
+                pending.insert(master.start(Request::read(*node, object)), (*node, object));
             }
         }
-        Inquiry { open, findings: BTreeMap::new() }
+        Inquiry { pending, findings: BTreeMap::new() }
     }
 
     /// Handles the end of a transfer. Returns the findings after the last transfer.
@@ -118,7 +118,7 @@ impl Inquiry {
         result: &Result<Answer, SdoError>,
         master: &mut Master<'_>,
     ) -> Option<BTreeMap<NodeId, Findings>> {
-        let (node, object) = self.open.remove(&ticket)?;
+        let (node, object) = self.pending.remove(&ticket)?;
         let findings = self.findings.entry(node).or_default();
         match result {
             Ok(answer) => {
@@ -127,23 +127,24 @@ impl Inquiry {
                 findings.values.extend(uploaded.map(|uploaded| (object, uploaded.bytes.clone())));
             }
             Err(SdoError { failure: SdoFailure::NoAnswer { .. } | SdoFailure::Cancelled, .. }) => {
-                let (others, rest) = std::mem::take(&mut self.open).into_iter().partition(|(_, (of, _))| *of == node);
+                let (others, rest) =
+                    std::mem::take(&mut self.pending).into_iter().partition(|(_, (of, _))| *of == node);
                 let others: BTreeMap<Ticket, _> = others;
-                self.open = rest;
+                self.pending = rest;
                 master.forget(others.into_keys());
             }
             Err(_) => findings.answers = true,
         }
-        self.open.is_empty().then(|| std::mem::take(&mut self.findings))
+        self.pending.is_empty().then(|| std::mem::take(&mut self.findings))
     }
 
     /// Whether a transfer belongs to this inquiry.
     pub fn has(&self, ticket: Ticket) -> bool {
-        self.open.contains_key(&ticket)
+        self.pending.contains_key(&ticket)
     }
 
-    /// Reads the objects and waits for the answers. The NMT state of answering nodes in
-    /// `guarded` is determined as by `nmt state`.
+    /// Reads the objects and waits for the answers. For answering nodes in `guarded`, the NMT state is determined as in
+    /// `nmt state`.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.

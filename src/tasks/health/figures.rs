@@ -1,4 +1,4 @@
-//! The figures as a list with verdicts.
+//! Lists the figures with their verdicts.
 
 use super::{Controller, Health, NodeTally};
 use crate::canopen::id::NodeId;
@@ -12,7 +12,8 @@ const LOAD_LIMIT: f64 = 60.0;
 /// The limit for the load in one second.
 const PEAK_LIMIT: f64 = 80.0;
 
-/// A heartbeat is late after this multiple of its time (1017h). Consumers usually wait for 1.5 to 2 times.
+/// A heartbeat is late after this multiple of the producer heartbeat time (1017h). Consumers usually wait 1.5 to 2
+/// times as long.
 const HEARTBEAT_FACTOR: f64 = 1.5;
 
 /// The limit for the SDO answer time of 99 % of the reads, in seconds.
@@ -54,7 +55,7 @@ impl Figure {
         Figure { verdict, ..self }
     }
 
-    fn saying(self, detail: Option<String>) -> Figure {
+    fn with_detail(self, detail: Option<String>) -> Figure {
         Figure { detail, ..self }
     }
 }
@@ -71,7 +72,7 @@ fn count(number: u64) -> Option<f64> {
     Some(number as f64)
 }
 
-/// All figures: those of the bus first.
+/// Returns all figures: those of the bus first.
 pub fn figures(health: &Health) -> Vec<Figure> {
     let bus = |name: &str, value, unit| Figure::new(None, name, value, unit);
     let frames: u64 = health.frames.values().sum();
@@ -89,12 +90,12 @@ pub fn figures(health: &Health) -> Vec<Figure> {
         bus("bus.load.peak", percent(health.load.peak()), "%").at_most(PEAK_LIMIT),
         bus("bus.burst", seconds(burst), "s"),
         bus("bus.burst.frames", in_burst.and_then(count), ""),
-        bus("bus.errors", count(faults), "").at_most(0.0).saying((faults > 0).then(|| words.join(", "))),
+        bus("bus.errors", count(faults), "").at_most(0.0).with_detail((faults > 0).then(|| words.join(", "))),
         bus("bus.dropped", count(health.dropped), "").at_most(0.0),
     ];
     if let Some(controller) = health.controller {
         let is_ok = controller.state == "error-active";
-        let state = bus("bus.state", None, "").saying(Some(controller.state.to_owned()));
+        let state = bus("bus.state", None, "").with_detail(Some(controller.state.to_owned()));
         all.push(Figure { verdict: Some(Verdict { limit: 0.0, is_ok }), ..state });
         all.push(bus("bus.tx-errors", controller.tx_errors.map(f64::from), ""));
         all.push(bus("bus.rx-errors", controller.rx_errors.map(f64::from), ""));
@@ -109,7 +110,7 @@ pub fn figures(health: &Health) -> Vec<Figure> {
     all
 }
 
-/// The names of all figures.
+/// Returns the names of all figures.
 pub fn names() -> BTreeSet<String> {
     let controller = Some(Controller { state: "", tx_errors: None, rx_errors: None });
     let frames = FrameKind::ALL.map(|kind| (kind, 0)).into();
@@ -121,13 +122,13 @@ fn of_node(node: NodeId, tally: &NodeTally, health: &Health) -> Vec<Figure> {
     let figure = |name: &str, value, unit| Figure::new(Some(node), name, value, unit);
     let (heartbeat, answers) = (&tally.heartbeat, &tally.answers);
     let wanted = tally.heartbeat_time.filter(|time| !time.is_zero());
-    // A heartbeat that never came is late by the whole time.
-    let never = wanted.filter(|_| heartbeat.count() == 0).map(|_| health.length);
-    let longest = figure("node.heartbeat.max", seconds(tally.longest_heartbeat().or(never)), "s");
+    // Without any heartbeat, the longest interval is the whole observation.
+    let without_heartbeat = wanted.filter(|_| heartbeat.count() == 0).map(|_| health.length);
+    let longest = figure("node.heartbeat.max", seconds(tally.longest_heartbeat().or(without_heartbeat)), "s");
     let rate = (!health.length.is_zero()).then(|| tally.frames as f64 / health.length.as_secs_f64());
     let emergency = tally.last_emergency.as_ref().map(|(code, meaning)| format!("{code:04X}h {meaning}"));
     vec![
-        figure("node.state", None, "").saying(tally.state.map(|state| state.to_string())),
+        figure("node.state", None, "").with_detail(tally.state.map(|state| state.to_string())),
         figure("node.frames", count(tally.frames), ""),
         figure("node.rate", rate, "1/s"),
         figure("node.load", percent(health.load.share_of(tally.bits)), "%"),
@@ -144,7 +145,7 @@ fn of_node(node: NodeId, tally: &NodeTally, health: &Health) -> Vec<Figure> {
         figure("node.sdo.p99", seconds(answers.p99()), "s").at_most(ANSWER_LIMIT),
         figure("node.sdo.max", seconds(answers.max()), "s"),
         figure("node.sdo.unanswered", count(tally.unanswered), "").at_most(0.0),
-        figure("node.emcy", count(tally.emergencies), "").at_most(0.0).saying(emergency),
+        figure("node.emcy", count(tally.emergencies), "").at_most(0.0).with_detail(emergency),
         figure("node.restarts", count(tally.restarts), "").at_most(0.0),
     ]
 }

@@ -23,7 +23,7 @@ pub struct Load {
     recent: VecDeque<(Mono, u64)>,
     recent_bits: u64,
     peak_bits: u64,
-    /// The last frame, and the burst that ends with it: its frames and its start.
+    /// The time of the last frame; the number of frames and the start of the burst that ends with this frame.
     burst: Option<(Mono, u64, Mono)>,
     longest: (Duration, u64),
 }
@@ -33,7 +33,7 @@ impl Load {
         Load { bit_rate, start, end: start, ..Load::default() }
     }
 
-    /// Counts a frame that was received at this time. Returns its bits.
+    /// Counts a frame that was received at this time. Returns the number of its bits.
     pub(super) fn add(&mut self, frame: &Frame, at: Mono) -> u64 {
         let bits = frame_bits(frame) + INTERMISSION;
         self.count(u64::from(bits), at);
@@ -101,7 +101,7 @@ impl Load {
         if self.end.since(self.start) < WINDOW { self.mean() } else { self.share(self.peak_bits, WINDOW) }
     }
 
-    /// The longest sequence of frames without a pause: its duration and the number of its frames. `None` if the bit
+    /// Returns the duration and the number of frames of the longest burst (frames without a pause). `None` if the bit
     /// rate is unknown.
     pub fn longest_burst(&self) -> Option<(Duration, u64)> {
         self.bit_rate.map(|_| self.longest)

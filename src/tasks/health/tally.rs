@@ -10,7 +10,7 @@ use crate::node::transfers::Outcome;
 use crate::tasks::monitor::{Content, Entry, SdoMessage};
 use std::time::Duration;
 
-/// Times: their number, extremes, mean and quantiles.
+/// Statistics of times: number, minimum, maximum, mean and 99 % quantile.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spread {
     histogram: Histogram,
@@ -52,15 +52,15 @@ impl Spread {
 /// The figures of one node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NodeTally {
-    /// Its frames.
+    /// The number of its frames.
     pub frames: u64,
-    /// Their bits on the bus.
+    /// The number of bits of these frames on the bus.
     pub bits: u64,
     /// The last known NMT state.
     pub state: Option<NmtState>,
     /// The intervals between its heartbeats.
     pub heartbeat: Spread,
-    /// The time since its last heartbeat at the end, if it is longer than all intervals.
+    /// The time from its last heartbeat to the end, if it is longer than all intervals.
     pub overdue: Option<Duration>,
     /// The producer heartbeat time (1017h), if it was read.
     pub heartbeat_time: Option<Duration>,
@@ -90,7 +90,7 @@ impl NodeTally {
             Content::Guarded(state, _) => self.state = Some(*state),
             Content::BootUp => {
                 self.restarts += 1;
-                // A time that includes a restart is not an interval.
+                // The interval that includes a restart is not counted.
                 self.last_heartbeat = None;
             }
             Content::Emergency(emergency, meaning) if emergency.code != 0 => {
