@@ -1,4 +1,4 @@
-//! Temporary writes that must be undone if the program is killed. Each one is recorded before it is sent.
+//! Temporary writes that must be undone if the program is killed. Each write is recorded before it is sent.
 //!
 //! The file is handled by the layer above. The tasks use the trait [`Journal`].
 
@@ -19,7 +19,7 @@ pub struct TemporaryWrite {
     pub identity: [Option<u32>; 4],
     /// The object.
     pub object: ObjectId,
-    /// Its bytes before.
+    /// The bytes of the object before the write.
     pub before: Vec<u8>,
     /// The bytes written.
     pub written: Vec<u8>,
@@ -46,7 +46,7 @@ pub trait Journal {
     fn remove(&mut self, write: &TemporaryWrite);
 }
 
-/// No journal, for a bus whose devices end together with the program.
+/// Records nothing. For a bus whose devices exist only while the program runs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoJournal;
 
@@ -79,7 +79,7 @@ impl Undone {
 }
 
 impl TemporaryWrite {
-    /// The record of a write to this node.
+    /// Creates the record of a write to this node.
     pub fn to(node: &Node, object: ObjectId, before: &[u8], written: &[u8]) -> TemporaryWrite {
         let identity = node.identity.numbers();
         TemporaryWrite { node: node.id, identity, object, before: before.to_vec(), written: written.to_vec() }
@@ -99,13 +99,13 @@ impl TemporaryWrite {
                 return Ok(Undone::OtherDevice);
             }
         }
-        match self.holds(master, &self.written)? {
+        match self.has_value(master, &self.written)? {
             Some(true) => {}
             Some(false) => return Ok(Undone::ChangedSince),
             None => return Ok(Undone::NotRestored),
         }
         match write(master, &Node::new(self.node), self.object, &self.before) {
-            Ok(_) if self.holds(master, &self.before)? == Some(true) => Ok(Undone::Restored),
+            Ok(_) if self.has_value(master, &self.before)? == Some(true) => Ok(Undone::Restored),
             Err(Error::Bus(error)) => Err(MasterError::Bus(error)),
             Err(Error::Interrupted) => Err(MasterError::Interrupted),
             Ok(_) | Err(_) => Ok(Undone::NotRestored),
@@ -114,7 +114,7 @@ impl TemporaryWrite {
 
     /// Whether the object has this value. `None` if it cannot be read. A device that does not indicate the size sends
     /// four bytes for every type.
-    fn holds(&self, master: &mut Master<'_>, bytes: &[u8]) -> Result<Option<bool>, MasterError> {
+    fn has_value(&self, master: &mut Master<'_>, bytes: &[u8]) -> Result<Option<bool>, MasterError> {
         let answer = master.transfer_one(Request::read(self.node, self.object))?;
         let found = answer.ok().and_then(|answer| answer.uploaded).map(|uploaded| uploaded.bytes);
         Ok(found.map(|found| found.starts_with(bytes)))

@@ -54,15 +54,15 @@ pub struct LogOptions {
     pub wanted: Vec<Wanted>,
     /// The source of the values.
     pub mode: Mode,
-    /// Ends after this time.
+    /// The recording ends after this time.
     pub duration: Option<Duration>,
-    /// Ends after this many values.
+    /// The recording ends after this many values.
     pub count: Option<u64>,
     /// Whether nodes may be started. If another NMT master is seen, they are started only with `start_all`.
     pub nmt: bool,
     /// Whether devices that are not sensors (profiles 401, 402 and others) are started too.
     pub start_all: bool,
-    /// Longer intervals are gaps; `None` for three usual intervals.
+    /// Longer intervals are gaps; `None` for three times the usual interval.
     pub max_gap: Option<Duration>,
     /// Descriptions chosen by the user.
     pub overrides: Overrides,
@@ -134,11 +134,11 @@ pub enum LogEvent {
 
 /// Receives samples and events. `Break` ends the recording.
 pub trait Observer {
-    /// Nodes whose setup could not be read, before [`Observer::begin`]. The other nodes are recorded. A passive
-    /// recording does not call it.
+    /// Called before [`Observer::begin`] if the setup of nodes could not be read. The other nodes are recorded. A
+    /// passive recording does not call it.
     fn failed(&mut self, _failures: &[Failure]) {}
 
-    /// The nodes to be recorded, before anything is changed. A passive recording does not call it.
+    /// Called with the nodes to be recorded, before anything is changed. A passive recording does not call it.
     ///
     /// # Errors
     /// The recording must not start.
@@ -146,8 +146,8 @@ pub trait Observer {
         Ok(())
     }
 
-    /// The sources to be recorded, in the order of their numbers, before anything is changed. More sources may follow
-    /// later. A passive recording does not call it.
+    /// Called with the sources to be recorded, in the order of their numbers, before anything is changed. More sources
+    /// may follow later. A passive recording does not call it.
     ///
     /// # Errors
     /// The recording must not start.
@@ -368,7 +368,7 @@ fn restore_states(
     if let Err(error) = restored {
         recording.remarks.push(Remark::StatesNotRestored(Box::new(error)));
     }
-    // A failure is shown without the remarks. It names the states itself.
+    // A failure is shown without the remarks, so it must contain the states.
     let with_states = |mut failure: Failure| {
         failure.effects.extend(states.iter().cloned());
         failure
@@ -387,7 +387,7 @@ fn finish(mut recording: Recording<'_>, result: Result<(), Error>) -> Result<Rec
     Ok(recording.report())
 }
 
-/// `period` times `n`, exact to the nanosecond. Saturates.
+/// Returns `period` times `n`, exact to the nanosecond. Saturates.
 fn nth(period: Duration, n: u64) -> Duration {
     let nanoseconds = period.as_nanos().saturating_mul(u128::from(n));
     Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))

@@ -40,7 +40,7 @@ pub enum TpdoChange {
     CobIdFlags,
 }
 
-/// The differences between two surveys of a node; empty if there are none.
+/// Returns the differences between two surveys of a node; empty if there are none.
 pub(in crate::tasks) fn changes(before: &Node, now: &Node) -> Vec<Change> {
     let mut changes = Vec::new();
     let (old, new) = (&before.identity, &now.identity);

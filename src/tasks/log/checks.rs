@@ -19,14 +19,14 @@ use std::time::Duration;
 pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), Failure> {
     let polled = matches!(options.mode, Mode::Poll(_));
     for item in &options.wanted {
-        let carried = |node: &Node| node.tpdos.iter().any(|tpdo| tpdo.cob_id.is_valid() && carries(node, tpdo, item));
-        if !nodes.iter().any(carried) {
+        let is_mapped = |node: &Node| node.tpdos.iter().any(|tpdo| tpdo.cob_id.is_valid() && carries(node, tpdo, item));
+        if !nodes.iter().any(is_mapped) {
             let has = |name: &str, with_status: bool| {
                 let signals = nodes.iter().flat_map(|node| &node.signals);
                 signals.filter(|signal| signal.name == name).any(|signal| !with_status || signal.status.is_some())
             };
-            let meant = nodes.iter().map(|node| node.wanted(item)).find(|meant| meant != item);
-            let name = match meant.as_ref().unwrap_or(item) {
+            let resolved = nodes.iter().map(|node| node.wanted(item)).find(|resolved| resolved != item);
+            let name = match resolved.as_ref().unwrap_or(item) {
                 Wanted::Signal(name) | Wanted::Status(name) if !has(name, false) => {
                     return Err(Failure::general(unknown_signal(name, nodes)));
                 }
@@ -49,8 +49,8 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
     Ok(())
 }
 
-/// Checks that the TPDOs of the nodes of a passive recording contain every requested signal. Without a description of a
-/// node, the recording does not show which further signals the node has.
+/// Checks that the TPDOs of the nodes of a passive recording contain every requested signal. Without a description,
+/// further signals of a node are unknown.
 pub(super) fn check_overheard(nodes: &[Node], options: &LogOptions) -> Result<(), Failure> {
     check_wanted(nodes, options).map_err(|failure| {
         let name = match &failure.cause {
@@ -114,7 +114,7 @@ pub(super) fn refuse_second_sync(
     }
     let length = (period * 3).clamp(Duration::from_millis(200), Duration::from_secs(2));
     let until = master.now() + length;
-    let second = wait(master, until, Policy::Command, |_, event| match event {
+    let second_sync = wait(master, until, Policy::Command, |_, event| match event {
         Happening::Frame(received) if ids.contains(&received.frame.id()) && !received.frame.is_remote() => {
             ControlFlow::Break(())
         }
@@ -124,14 +124,14 @@ pub(super) fn refuse_second_sync(
         }
         _ => ControlFlow::Continue(()),
     })?;
-    if second.done().is_none() {
+    if second_sync.done().is_none() {
         return Ok(());
     }
     Err(Failure::general(LogFailure::SecondSyncProducer))
 }
 
-/// The bus load (0 to 1) of SYNC at this interval and of the following TPDOs, with the greatest frame length. `None` if
-/// the bit rate is unknown.
+/// Returns the bus load (0 to 1) of SYNC at this interval and of the TPDOs that follow it, for the greatest frame
+/// length. `None` if the bit rate is unknown.
 pub(super) fn sync_share(master: &Master<'_>, nodes: &[Node], period: Duration) -> Option<f64> {
     let bit_rate = master.bus().bit_rate()?;
     let tpdos = nodes.iter().flat_map(|node| &node.tpdos).filter(|tpdo| tpdo.cob_id.is_valid());
@@ -143,8 +143,8 @@ pub(super) fn sync_share(master: &Master<'_>, nodes: &[Node], period: Duration) 
     Some((SYNC_BITS + answers.sum::<f64>()) / f64::from(bit_rate) / period.as_secs_f64())
 }
 
-/// A frame with eight bytes, all stuff bits, and the interframe space.
+/// The bits of a frame with eight bytes, with all stuff bits and the interframe space.
 const MAX_FRAME_BITS: f64 = 135.0;
 
-/// A frame without data, some stuff bits, and the interframe space.
+/// The bits of a frame without data, with some stuff bits and the interframe space.
 const SYNC_BITS: f64 = 50.0;

@@ -50,9 +50,9 @@ pub enum LogFailure {
     UnknownMapping,
     /// A passive recording received only TPDOs of a wrong length from the node.
     OtherLength {
-        /// The length of their mapping in bytes.
+        /// The mapped length in bytes.
         mapped: usize,
-        /// Their length in bytes.
+        /// The received length in bytes.
         received: usize,
         /// `false` for a recording that is replayed.
         is_live: bool,

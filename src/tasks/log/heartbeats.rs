@@ -1,4 +1,4 @@
-//! The heartbeats of the recorded nodes: stopped, back, another NMT state.
+//! Watches the heartbeats of the recorded nodes: a heartbeat stops or is back, or its NMT state changes.
 
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
@@ -17,13 +17,13 @@ pub(super) enum HeartbeatChange {
     None,
     /// The heartbeat was lost and is back.
     Back,
-    /// The state differs from that in the last heartbeat.
+    /// The state differs from the state in the last heartbeat.
     State(NmtState),
 }
 
 #[derive(Debug)]
 struct Heartbeat {
-    /// 1017h.
+    /// The producer heartbeat time (1017h).
     period: Duration,
     last: Mono,
     state: Option<NmtState>,
@@ -71,7 +71,7 @@ impl HeartbeatMonitor {
         heartbeat.is_some_and(|heartbeat| heartbeat.state == Some(NmtState::Operational))
     }
 
-    /// A node whose heartbeat has stopped, and since when. Each loss is returned once.
+    /// Returns a node whose heartbeat has stopped, and the time since its last heartbeat. Each loss is returned once.
     pub(super) fn next_lost(&mut self, now: Mono) -> Option<(NodeId, Duration)> {
         let is_late =
             |heartbeat: &Heartbeat| !heartbeat.is_lost && now.since(heartbeat.last) > heartbeat.period * 2 + TOLERANCE;

@@ -25,7 +25,7 @@ pub(in crate::tasks) struct SetupListener {
     overrides: Overrides,
     wanted: Vec<Wanted>,
     overheard: Overheard,
-    /// Descriptions of devices whose identity is known from elsewhere.
+    /// Descriptions of devices whose identity is known from another source.
     pub(in crate::tasks) recognised: Overrides,
     /// COB-IDs of TPDOs whose mapping is unknown, and the nodes that sent them.
     pub(in crate::tasks) not_understood: BTreeMap<CanId, NodeId>,
@@ -66,12 +66,12 @@ impl SetupListener {
         None
     }
 
-    /// The next node that sent two answers to one request of another master, with the object.
+    /// Returns the next node that sent two answers to one request of another master, with the object.
     pub(in crate::tasks) fn next_second_answer(&mut self) -> Option<(NodeId, ObjectId, SecondAnswer)> {
         std::iter::from_fn(|| self.overheard.next_second_answer()).find(|(node, ..)| self.nodes.contains(node))
     }
 
-    /// Ignores a node from now on. Returns whether others are left.
+    /// Ignores a node from now on. Returns whether other nodes are left.
     pub(in crate::tasks) fn exclude(&mut self, node: NodeId, decoder: &mut Decoder) -> bool {
         self.nodes.remove(&node);
         decoder.remove(node);
@@ -88,21 +88,22 @@ impl SetupListener {
         }
     }
 
-    /// The number in an object: from the SDO traffic, else the default in the description that the user named.
+    /// Returns the number in an object: from the SDO traffic, else the default in the description that the user named.
     pub(in crate::tasks) fn number(&self, node: NodeId, object: ObjectId) -> Option<u32> {
         let default = || first_four(&self.named(node)?.dictionary.get(object)?.default_bytes(node)?).into();
         self.overheard.number(node, object).or_else(default)
     }
 
-    /// The description that the user named for a node, unless the node reports another vendor or product.
+    /// Returns the description that the user named for a node, unless the node reports another vendor or product.
     fn named(&self, node: NodeId) -> Option<&Arc<Model>> {
         self.overrides.get(&node).filter(|model| self.overheard.identity(node).fits(model))
     }
 
-    /// The number in an object of four bytes. An answer with fewer bytes is not used, and replaces no default.
+    /// Returns the number in an object of four bytes. After an answer with fewer bytes, the number is unknown: the
+    /// default is not used.
     fn word(&self, node: NodeId, object: ObjectId) -> Option<u32> {
-        let is_cut = self.overheard.bytes(node, object).is_some_and(|bytes| bytes.len() < 4);
-        self.number(node, object).filter(|_| !is_cut)
+        let is_truncated = self.overheard.bytes(node, object).is_some_and(|bytes| bytes.len() < 4);
+        self.number(node, object).filter(|_| !is_truncated)
     }
 
     fn byte(&self, node: NodeId, object: ObjectId) -> Option<u8> {
@@ -134,7 +135,7 @@ impl SetupListener {
         }
     }
 
-    /// The known part of a node. The result contains only TPDOs with a known COB-ID and a complete mapping.
+    /// Returns the known part of a node. It contains only TPDOs with a known COB-ID and a complete mapping.
     pub(in crate::tasks) fn known_node(&self, id: NodeId) -> Node {
         let mut node = Node::new(id);
         node.identity = self.overheard.identity(id);
@@ -160,7 +161,7 @@ impl SetupListener {
         Some(Tpdo { number, cob_id, transmission, event_timer_ms: None, mapping: mapping? })
     }
 
-    /// The measuring range (6148h, 6149h), if another master read it.
+    /// Returns the measuring range (6148h, 6149h), if another master read it.
     fn range(&self, node: &Node, channel: u8, digits: Option<u8>) -> MeasuringRange {
         let end_of_range = |index: u16| {
             let object = ObjectId::new(index, channel);
@@ -186,7 +187,7 @@ impl SetupListener {
         found.into_iter().map(|signal| self.with_unit(node, signal)).collect()
     }
 
-    /// The signal with its unit, its digits and its range, as far as they are known.
+    /// Adds unit, digits and range to a signal, as far as they are known.
     fn with_unit(&self, node: &Node, mut signal: Signal) -> Signal {
         let [unit, digits] = signals::unit_and_digits(node, &signal);
         let unit = unit.and_then(|object| self.word(node.id, object)).map(Unit);
@@ -222,7 +223,7 @@ pub(in crate::tasks) fn is_constant(object: ObjectId) -> bool {
     is_setup(object) || matches!(object.index, 0x1000 | 0x1008..=0x100a | 0x1018)
 }
 
-/// The node that sends TPDOs with this COB-ID in the predefined connection set.
+/// Returns the node that sends TPDOs with this COB-ID in the predefined connection set.
 pub(super) fn predefined_tpdo(frame: &Frame) -> Option<NodeId> {
     match frame.id() {
         CanId::Standard(id) if matches!(id & 0x780, 0x180 | 0x280 | 0x380 | 0x480) && !frame.is_remote() => {

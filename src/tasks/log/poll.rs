@@ -1,4 +1,4 @@
-//! Polling by SDO: every signal of every node once per interval, all nodes in parallel.
+//! Polls by SDO: every signal of every node once per interval, all nodes in parallel.
 
 use super::nth;
 use super::silence::Silent;
@@ -19,8 +19,8 @@ pub(super) struct Poll {
     cycles: u64,
     targets: Vec<Target>,
     /// Whether each target is polled at present.
-    live: Vec<bool>,
-    open: BTreeMap<Ticket, (usize, Part)>,
+    is_polled: Vec<bool>,
+    requests: BTreeMap<Ticket, (usize, Part)>,
     answers: Vec<Parts>,
     /// The last answer of each target, if it was an error.
     errors: Vec<Option<SdoError>>,
@@ -37,7 +37,7 @@ enum Part {
 
 #[derive(Default)]
 struct Parts {
-    under_way: usize,
+    open_requests: usize,
     cycle: u64,
     value: Option<Result<Answer, SdoError>>,
     status: Option<Result<Answer, SdoError>>,
@@ -54,8 +54,8 @@ impl Poll {
             period,
             cycles: 0,
             targets: Vec::new(),
-            live: Vec::new(),
-            open: BTreeMap::new(),
+            is_polled: Vec::new(),
+            requests: BTreeMap::new(),
             answers: Vec::new(),
             errors: Vec::new(),
             has_status: Vec::new(),
@@ -86,16 +86,16 @@ impl Poll {
             target.reading.source = decoder.add_source(target.source.clone());
             // Reuse the entries of earlier targets of this node.
             let is_free = |&at: &usize| {
-                !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == node.id
+                !self.is_polled[at] && self.answers[at].open_requests == 0 && self.targets[at].source.node == node.id
             };
             match (0..self.targets.len()).find(is_free) {
                 Some(at) => {
-                    (self.targets[at], self.live[at], self.errors[at]) = (target, true, None);
+                    (self.targets[at], self.is_polled[at], self.errors[at]) = (target, true, None);
                     self.has_status[at] = None;
                 }
                 None => {
                     self.targets.push(target);
-                    self.live.push(true);
+                    self.is_polled.push(true);
                     self.answers.push(Parts::default());
                     self.errors.push(None);
                     self.has_status.push(None);
@@ -105,42 +105,42 @@ impl Poll {
         Ok(())
     }
 
-    /// The error of the last poll of a silent node or source.
+    /// Returns the error of the last poll of a silent node or source.
     pub(super) fn error(&self, silent: Silent) -> Option<&SdoError> {
-        let is_meant = |target: &Target| match silent {
+        let is_silent = |target: &Target| match silent {
             Silent::Node(node) => target.source.node == node,
             Silent::Source(_, source) => target.reading.source == source,
         };
         self.targets
             .iter()
             .zip(&self.errors)
-            .filter(|(target, _)| is_meant(target))
+            .filter(|(target, _)| is_silent(target))
             .find_map(|(_, error)| error.as_ref())
     }
 
     /// Stops polling a node. Pending answers are ignored.
     pub(super) fn pause(&mut self, node: NodeId) {
-        for (target, live) in self.targets.iter().zip(&mut self.live) {
-            *live &= target.source.node != node;
+        for (target, is_polled) in self.targets.iter().zip(&mut self.is_polled) {
+            *is_polled &= target.source.node != node;
         }
     }
 
-    /// When the next cycle starts; the first one is at `start`.
+    /// Returns when the next cycle starts. The first cycle starts at `start`.
     pub(super) fn due(&self, start: Mono) -> Mono {
         start + nth(self.period, self.cycles)
     }
 
-    /// The number of the next cycle.
+    /// Returns the number of the next cycle.
     pub(super) fn next_cycle(&self) -> u64 {
         self.cycles
     }
 
-    /// The cycle in which this request was sent.
+    /// Returns the cycle in which this request was sent.
     pub(super) fn cycle_of(&self, ticket: Ticket) -> Option<u64> {
-        self.open.get(&ticket).map(|&(at, _)| self.answers[at].cycle)
+        self.requests.get(&ticket).map(|&(at, _)| self.answers[at].cycle)
     }
 
-    /// The number of cycles that start until `now`.
+    /// Returns the number of cycles that start until `now`.
     fn cycles_until(&self, start: Mono, now: Mono) -> u64 {
         if now < start {
             return 0;
@@ -161,12 +161,12 @@ impl Poll {
         let late = cycles - cycle - 1;
         let mut skipped = 0u64;
         for (at, target) in self.targets.iter().enumerate() {
-            if !self.live[at] {
+            if !self.is_polled[at] {
                 continue;
             }
             skipped = skipped.saturating_add(late);
             let parts = &mut self.answers[at];
-            if parts.under_way > 0 {
+            if parts.open_requests > 0 {
                 skipped = skipped.saturating_add(1);
                 continue;
             }
@@ -175,8 +175,8 @@ impl Poll {
             let parts_asked = if self.has_status[at] == Some(false) { 1 } else { 2 };
             let asked: Vec<_> = objects(target).zip([Part::Value, Part::Status]).take(parts_asked).collect();
             for ((node, object), part) in asked.into_iter().rev() {
-                self.open.insert(master.start(Request::read(node, object)), (at, part));
-                parts.under_way += 1;
+                self.requests.insert(master.start(Request::read(node, object)), (at, part));
+                parts.open_requests += 1;
             }
         }
         skipped
@@ -190,18 +190,18 @@ impl Poll {
         decoder: &Decoder,
         samples: &mut Vec<Sample>,
     ) -> Option<SdoError> {
-        let (at, part) = self.open.remove(&ticket)?;
+        let (at, part) = self.requests.remove(&ticket)?;
         let parts = &mut self.answers[at];
-        parts.under_way -= 1;
+        parts.open_requests -= 1;
         match part {
             Part::Value => parts.value = Some(result),
             Part::Status => parts.status = Some(result),
         }
-        if parts.under_way > 0 {
+        if parts.open_requests > 0 {
             return None;
         }
         let parts = std::mem::take(parts);
-        if !self.live[at] {
+        if !self.is_polled[at] {
             return None;
         }
         let target = &self.targets[at];

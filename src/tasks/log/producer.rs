@@ -44,7 +44,7 @@ impl Producer {
         self.start = at;
     }
 
-    /// The next SYNC message. The counter continues only if the previous message was sent.
+    /// Returns the next SYNC message. The counter continues only if the previous message was sent.
     fn frame(&self, id: CanId) -> Frame {
         match self.overflow {
             None => Frame::empty(id),
@@ -55,12 +55,12 @@ impl Producer {
         }
     }
 
-    /// When the next SYNC is due. The time is computed from the start, so it does not drift.
+    /// Returns when the next SYNC is due. The time is computed from the start, so it does not drift.
     pub(super) fn due(&self) -> Mono {
         self.start + nth(self.interval, self.slot)
     }
 
-    /// The number of the next SYNC.
+    /// Returns the number of the next SYNC.
     pub(super) fn slot(&self) -> u64 {
         self.slot
     }
@@ -101,8 +101,8 @@ impl Producer {
     }
 }
 
-/// The slot that follows `slot`. If the program was stopped, the missed SYNC messages are omitted. Otherwise they would
-/// be sent in a burst.
+/// Returns the slot that follows `slot`. If the program was stopped, the missed SYNC messages are omitted. Otherwise
+/// they would be sent in a burst.
 fn next_slot(start: Mono, now: Mono, interval: Duration, slot: u64) -> u64 {
     let passed = now.since(start).as_nanos() / interval.as_nanos().max(1);
     let passed = u64::try_from(passed).unwrap_or(u64::MAX - 2);

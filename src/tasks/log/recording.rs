@@ -1,4 +1,4 @@
-//! The recording itself: frames in, samples out.
+//! Converts received frames to samples, and passes them to the observer.
 
 mod due;
 mod emergencies;
@@ -39,7 +39,7 @@ use tally::Tally;
 /// A signal without values is reported only if the recording is at least this long.
 const MIN_SIGNAL_TIME: Duration = Duration::from_secs(1);
 
-/// The longest time for which values are kept if another node sends SYNC. Values are written within a second.
+/// The longest time for which values are kept if another node sends SYNC. Values must be written within a second.
 const FOREIGN_SECOND_SENDER_TIMEOUT: Duration = Duration::from_millis(900);
 
 /// A recording: the setup of the nodes, and the values.
@@ -57,7 +57,7 @@ pub(super) struct Recording<'o> {
     faults: Repetitions<Fault>,
     due: DueTpdos,
     synced: SyncedTpdos,
-    /// Nodes whose node-ID or COB-ID two devices have. Their TPDOs are ignored.
+    /// Nodes whose node-ID or COB-ID is used by two devices. Their TPDOs are ignored.
     pub(super) two_devices: BTreeMap<NodeId, Failure>,
     /// The values of the first SYNC. They are kept until it is known that no second device answers.
     early: Vec<Vec<Sample>>,
@@ -98,7 +98,7 @@ pub(super) struct Recording<'o> {
 
 impl<'o> Recording<'o> {
     pub(super) fn new(nodes: Vec<Node>, options: &'o LogOptions, bus: &dyn Bus) -> Recording<'o> {
-        // A passive recording does not know its nodes yet. It expects those that the user named.
+        // A passive recording does not know its nodes yet. It expects the nodes that the user named.
         let is_passive = options.mode == Mode::Passive && options.nodes.len() < NodeId::all().count();
         let named = options.nodes.iter().copied().filter(|_| is_passive);
         let expected: Vec<NodeId> = nodes.iter().map(|node| node.id).chain(named).collect();
@@ -143,13 +143,14 @@ impl<'o> Recording<'o> {
         }
     }
 
-    /// The TPDOs with values that are recorded.
+    /// Returns the TPDOs whose values are recorded.
     fn recorded_tpdos(&self) -> impl Iterator<Item = (&Node, &Tpdo)> {
         let tpdos = self.nodes.iter().flat_map(|node| node.tpdos.iter().map(move |tpdo| (node, tpdo)));
         tpdos.filter(|(_, tpdo)| tpdo.cob_id.is_valid() && self.decoder.values_of(tpdo.cob_id.can_id()) > 0)
     }
 
-    /// The interval at which this program sends SYNC; `None` if it sends none. Requests of type 252 need SYNC.
+    /// Returns the interval at which this program sends SYNC; `None` if it sends no SYNC. Requests of type 252 need
+    /// SYNC.
     pub(super) fn sync_interval(&self) -> Option<Duration> {
         let mut kinds = self.recorded_tpdos().map(|(_, tpdo)| tpdo.transmission);
         match self.options.mode {
@@ -226,7 +227,7 @@ impl<'o> Recording<'o> {
         self.ignore_without_signals(nodes);
     }
 
-    /// Expects no samples from those of `nodes` that have none of the requested signals, if another node has one.
+    /// Expects no samples from `nodes` without any of the requested signals, if another node has such a signal.
     fn ignore_without_signals(&mut self, nodes: Vec<NodeId>) {
         let sources = self.decoder.sources();
         if self.options.wanted.is_empty() || sources.is_empty() {
@@ -255,7 +256,8 @@ impl<'o> Recording<'o> {
         self.tally.set_sources(self.decoder.sources());
     }
 
-    /// The filters for TPDOs, emergencies, heartbeats and SDO messages of the recorded nodes, and for SYNC and NMT.
+    /// Returns the filters for TPDOs, emergencies, heartbeats and SDO messages of the recorded nodes, and for SYNC and
+    /// NMT.
     pub(super) fn filters(&self) -> Filters {
         let mut ids: Vec<CanId> = self.decoder.can_ids().chain([CanId::NMT]).collect();
         for node in &self.nodes {
@@ -311,7 +313,7 @@ impl<'o> Recording<'o> {
         ControlFlow::Continue(())
     }
 
-    /// Handles the result of an SDO transfer: of a reread or of a poll.
+    /// Handles the result of an SDO transfer, which belongs to a reread, an inquiry or a poll.
     fn answer(
         &mut self,
         ticket: Ticket,

@@ -1,8 +1,8 @@
 //! Nodes whose setup must be read again.
 //!
 //! After any event that may have changed the mapping, unit or digits of a node, its setup is uncertain. Its frames are
-//! then ignored until the setup was read again (exceptions: [`RereadReason`]). Missing rows are counted and reported. Rows
-//! decoded with an old mapping would look right but be wrong.
+//! then ignored until the setup was read again (exceptions: [`RereadReason`]). The missing rows are counted and
+//! reported. Rows decoded with an old mapping would look right but be wrong.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
@@ -88,7 +88,8 @@ impl Rereads {
         }
     }
 
-    /// Requests that a node is read again. A survey in progress is restarted in most cases. Returns `false` if no reread is needed.
+    /// Requests a reread of a node. In most cases, a survey in progress is restarted. Returns `false` if no reread is
+    /// needed.
     pub(super) fn request(&mut self, node: NodeId, why: RereadReason, now: Mono, master: &mut Master<'_>) -> bool {
         if why == RereadReason::WrongLength {
             if self.wrong_lengths.get(&node).is_some_and(|&before| now.since(before) < WRONG_LENGTH_INTERVAL) {
@@ -180,7 +181,7 @@ impl Rereads {
         self.wrong_lengths.remove(&node);
     }
 
-    /// The nodes with an uncertain setup, except those with lost frames only.
+    /// Returns the nodes with an uncertain setup, except nodes of which only frames were lost.
     pub(super) fn paused(&self) -> impl Iterator<Item = NodeId> + '_ {
         self.pending.iter().filter(|(_, pending)| pending.recorded_since.is_none()).map(|(&node, _)| node)
     }
@@ -192,9 +193,9 @@ impl Pending {
     }
 }
 
-/// The node whose setup this frame of another master changes: PDO parameters and mapping, unit, digits, and the COB-IDs
-/// and times of SYNC, emergency and heartbeat.
-pub(super) fn writes_setup(frame: &Frame, nodes: &[Node]) -> Option<NodeId> {
+/// Returns the node whose setup this frame of another master changes: PDO parameters and mapping, unit, digits, and the
+/// COB-IDs and times of SYNC, emergency and heartbeat.
+pub(super) fn node_with_written_setup(frame: &Frame, nodes: &[Node]) -> Option<NodeId> {
     let node = frame.id().sdo_request_node()?;
     let [command, low, high, sub, ..] = frame.data() else { return None };
     // The start of a download: expedited or segmented (1), or block (6).
@@ -203,9 +204,9 @@ pub(super) fn writes_setup(frame: &Frame, nodes: &[Node]) -> Option<NodeId> {
     }
     let index = u16::from_le_bytes([*low, *high]);
     let object = ObjectId::new(index, *sub);
-    let scales = |known: &Node| known.id == node && signals::scaling_objects(known).contains(&object);
+    let is_scaling = |known: &Node| known.id == node && signals::scaling_objects(known).contains(&object);
     let is_setup = matches!(index, 0x1005 | 0x1014 | 0x1017 | 0x1800..=0x1bff | 0x6131 | 0x6132);
-    (is_setup || nodes.iter().any(scales)).then_some(node)
+    (is_setup || nodes.iter().any(is_scaling)).then_some(node)
 }
 
 #[cfg(test)]
@@ -214,7 +215,7 @@ mod tests {
 
     #[test]
     fn writes_that_change_the_setup() {
-        let node = |text: &str| writes_setup(&text.parse().expect("a frame"), &[]).map(NodeId::get);
+        let node = |text: &str| node_with_written_setup(&text.parse().expect("a frame"), &[]).map(NodeId::get);
         for text in ["605#2F001A0000000000", "605#2300180181010080", "605#2331610100004E00", "605#2131610104000000"] {
             assert_eq!(node(text), Some(5), "{text}");
         }

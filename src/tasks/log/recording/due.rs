@@ -15,7 +15,7 @@ use std::time::Duration;
 struct DueTpdo {
     /// The number n, 1 to 240.
     every: u8,
-    /// The values of the TPDO that are recorded.
+    /// The number of recorded values of the TPDO.
     values: u64,
     /// SYNC messages whose cycle has ended.
     syncs: u64,
@@ -34,7 +34,7 @@ pub(super) struct DueTpdos {
 }
 
 impl DueTpdos {
-    /// Uses the present setup of the nodes. The counts are kept.
+    /// Applies the present setup of the nodes, and keeps the counts.
     pub(super) fn set_up(&mut self, nodes: &[Node], decoder: &Decoder, mode: Mode) {
         for tpdo in nodes.iter().flat_map(|node| &node.tpdos).filter(|tpdo| tpdo.cob_id.is_valid()) {
             let every = match (mode, tpdo.transmission) {
@@ -50,7 +50,7 @@ impl DueTpdos {
         }
     }
 
-    /// A SYNC is sent at `at`. This ends the previous cycle.
+    /// Starts a cycle with the SYNC sent at `at`, and ends the previous cycle.
     pub(super) fn sync(&mut self, at: Mono) {
         if self.last.replace(at).is_some() {
             self.end_cycle();
@@ -71,7 +71,7 @@ impl DueTpdos {
         }
     }
 
-    /// The number of values that were due by `end` but did not arrive.
+    /// Returns the number of values that were due by `end` but did not arrive.
     pub(super) fn missing(mut self, end: Mono, interval: Duration) -> u64 {
         if self.last.is_some_and(|last| end.since(last) >= interval) {
             self.end_cycle();

@@ -57,7 +57,7 @@ impl Emergencies {
         }
     }
 
-    /// The emergency in a frame, and the node that sent it.
+    /// Returns the emergency in a frame, and the node that sent it.
     pub(super) fn parse(&self, frame: &Frame) -> Option<(NodeId, Emergency)> {
         let node = *self.nodes.get(&frame.id())?;
         Some((node, Emergency::parse(frame)?))
@@ -77,19 +77,19 @@ impl Emergencies {
         self.recent.is_new((node, emergency), is_same, now)
     }
 
-    /// An emergency that was repeated, and how often since it was last reported. `at_end` does not wait for the
-    /// interval.
+    /// Returns an emergency that was repeated, and the number of repetitions since its last report. With `at_end`, the
+    /// interval need not be over.
     pub(super) fn next_repeated(&mut self, now: Mono, at_end: bool) -> Option<(NodeId, Emergency, u64)> {
         self.recent.next(now, at_end).map(|((node, emergency), count)| (node, emergency, count))
     }
 
-    /// The meaning of an emergency code on this node, and the set bits of its error register. The bits are omitted if
-    /// the device always sends the same register with this code.
+    /// Returns the meaning of an emergency code on this node, and the set bits of its error register. The bits are
+    /// omitted if the device always sends the same register with this code.
     pub(super) fn meaning(&self, node: NodeId, emergency: Emergency) -> String {
         emergency_text(self.models.get(&node).map(|model| &model.description), emergency)
     }
 
-    /// The change of an overload that an emergency reports.
+    /// Returns the change of an overload that an emergency reports.
     pub(super) fn overload(&self, node: NodeId, emergency: Emergency) -> Option<OverloadChange> {
         let description = &self.models.get(&node)?.description;
         if emergency.code != 0 {
@@ -136,7 +136,7 @@ mod tests {
         let mut reported = Vec::new();
         for step in 0..1000 {
             let now = at(step * 2);
-            // Alternating emergencies are also limited, and those whose manufacturer bytes are a counter.
+            // The limit also applies to alternating emergencies, and if the manufacturer bytes are a counter.
             let emergency = if step % 2 == 0 { one } else { other };
             let counter = step.to_le_bytes();
             let emergency = Emergency { manufacturer: [counter[0], counter[1], 0, 0, 0], ..emergency };

@@ -14,7 +14,7 @@ use crate::tasks::Failure;
 use crate::tasks::log::changes::changes;
 use crate::tasks::log::heartbeats::HeartbeatChange;
 use crate::tasks::log::passive::{is_constant, predefined_tpdo};
-use crate::tasks::log::rereads::{Reread, RereadReason, writes_setup};
+use crate::tasks::log::rereads::{Reread, RereadReason, node_with_written_setup};
 use crate::tasks::log::{Change, FIRST_SAMPLE_TIMEOUT, LogEvent, LogFailure, Mode, Observer, Remark};
 use crate::tasks::synced::Surplus;
 use std::collections::BTreeSet;
@@ -25,7 +25,7 @@ use std::time::Duration;
 const UNKNOWN_TPDO_DELAY: Duration = Duration::from_secs(1);
 
 impl Recording<'_> {
-    /// Reports COB-IDs of two TPDOs.
+    /// Reports COB-IDs that two TPDOs share.
     pub(in crate::tasks::log) fn report_shared_cob_ids(&mut self, at: Stamp, observer: &mut dyn Observer) {
         for (id, tpdos) in self.decoder.take_shared_cob_ids() {
             let remark = Remark::SharedCobId(id, tpdos);
@@ -80,7 +80,7 @@ impl Recording<'_> {
             self.life(node, life, at, master, observer);
         } else if let Some((node, length)) = Life::unusual_length(frame) {
             self.wrong_heartbeat_length(node, length, at, observer);
-        } else if let Some(node) = writes_setup(frame, &self.nodes) {
+        } else if let Some(node) = node_with_written_setup(frame, &self.nodes) {
             self.request_reread(node, RereadReason::Written, at.mono, master);
         } else if let Some((command, node)) = NmtCommand::parse(frame) {
             let state = command.target();
@@ -92,15 +92,15 @@ impl Recording<'_> {
             let (count, length) = self.syncs_received.entry(frame.id()).or_default();
             (*count, *length) = (*count + 1, frame.data().len());
         } else if let Some((node, _)) = self.decoder.mapped_length(frame.id()).filter(|_| !frame.is_remote()) {
-            // Its mapping is unknown.
+            // The mapping of this TPDO is unknown.
             self.observed.entry(node).or_default().sends_tpdos = true;
         } else if self.receives_all && self.is_unknown_tpdo(frame) {
             self.unknown_cob_ids.insert(frame.id());
         }
     }
 
-    /// Whether this may be a TPDO of a recorded node with another COB-ID than in 180xh:1. TPDOs of other nodes that
-    /// send heartbeats are excluded.
+    /// Whether this may be a TPDO of a recorded node whose COB-ID differs from 180xh:1. TPDOs of other nodes that send
+    /// heartbeats are excluded.
     fn is_unknown_tpdo(&self, frame: &Frame) -> bool {
         let is_of_other = |of: NodeId| self.observed.contains_key(&of) && self.nodes.iter().all(|node| node.id != of);
         matches!(frame.id(), CanId::Standard(0x181..=0x57f))
@@ -168,9 +168,9 @@ impl Recording<'_> {
             listener.forget(node, &mut self.decoder);
             self.update_sources();
         }
-        // In a passive recording, a boot-up message that is the first sign of a node is no restart.
+        // In a passive recording, a boot-up message is no restart if it is the first message of the node.
         let is_unseen = !self.observed.contains_key(&node) && !self.has_sent(node) && self.early.is_empty();
-        let is_start = self.listener.is_some() && is_unseen;
+        let is_first_message = self.listener.is_some() && is_unseen;
         let observed = self.observed.entry(node).or_default();
         (observed.booted, observed.heartbeat_stopped) = (is_boot_up, false);
         observed.commanded = observed.commanded.filter(|_| !is_boot_up);
@@ -192,7 +192,7 @@ impl Recording<'_> {
             HeartbeatChange::State(NmtState::Operational) => {}
             HeartbeatChange::State(state) => observer.event(&LogEvent::State(node, state), at),
         }
-        if is_boot_up && !is_start {
+        if is_boot_up && !is_first_message {
             self.restarted(node, at, master, observer);
         }
     }
@@ -245,7 +245,7 @@ impl Recording<'_> {
         self.request_all_rereads(RereadReason::Disconnected, now, master);
     }
 
-    /// The kernel dropped frames.
+    /// Handles frames that the kernel dropped.
     pub(super) fn dropped(&mut self, count: u32, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let at = master.bus().now();
         self.tally.dropped += u64::from(count);
@@ -347,7 +347,7 @@ impl Recording<'_> {
         }
     }
 
-    /// Continues with the current setup of a node.
+    /// Continues the recording with the new setup of a node.
     fn update(&mut self, reread: Reread, master: &mut Master<'_>, observer: &mut dyn Observer) -> Result<(), Error> {
         let Reread { node, may_need_start, recorded_since } = reread;
         let (id, at) = (node.id, master.bus().now());
@@ -414,7 +414,7 @@ impl Recording<'_> {
         }
     }
 
-    /// The controller reports a fault.
+    /// Handles a fault of the controller.
     pub(super) fn fault(&mut self, fault: Fault, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
         if self.faults.is_new(fault, |&other| other == fault, at.mono) {
             observer.event(&LogEvent::Fault(fault), at);
@@ -427,7 +427,7 @@ impl Recording<'_> {
         }
     }
 
-    /// The interface went down or came back.
+    /// Handles a change of the link: the interface went down or came back.
     pub(super) fn link(&mut self, up: bool, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let at = master.bus().now();
         self.link_is_up = up;

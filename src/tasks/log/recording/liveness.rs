@@ -35,7 +35,7 @@ impl Liveness {
         Liveness { nodes, heartbeats: HeartbeatMonitor::default() }
     }
 
-    /// The nodes of which samples are expected or were received.
+    /// Returns the nodes of which samples are expected or were received.
     pub(super) fn nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
         self.nodes.keys().copied()
     }
@@ -83,7 +83,7 @@ impl Liveness {
         self.heartbeats.restart(now);
     }
 
-    /// A node that stopped sending samples, and for how long. Each silence is returned once.
+    /// Returns a node that stopped sending samples, and the length of its silence. Each silence is returned once.
     pub(super) fn next_silent(&mut self, now: Mono) -> Option<(NodeId, Duration)> {
         let heartbeats = &self.heartbeats;
         self.nodes.iter_mut().find_map(|(&node, liveness)| {
@@ -96,12 +96,12 @@ impl Liveness {
         })
     }
 
-    /// A node whose heartbeat stopped, and for how long. Each loss is returned once.
+    /// Returns a node whose heartbeat stopped, and the time since its last heartbeat. Each loss is returned once.
     pub(super) fn next_lost_heartbeat(&mut self, now: Mono) -> Option<(NodeId, Duration)> {
         self.heartbeats.next_lost(now)
     }
 
-    /// The nodes that sent no samples at all, or stopped before `end`.
+    /// Returns the nodes that sent no samples at all, or stopped before `end`.
     pub(super) fn lost(&self, end: Mono) -> Vec<NodeId> {
         let is_lost = |node: NodeId, liveness: &NodeLiveness| {
             liveness.samples.is_lost(end) && !(liveness.sends_on_change && self.heartbeats.is_operational(node))
@@ -141,7 +141,7 @@ mod tests {
         Mono::at(Duration::from_millis(milliseconds))
     }
 
-    /// Whether a node that sent two samples, and then heartbeats of `state` until 9 s, is lost at 10 s.
+    /// Whether a node is lost at `end` (in ms). It sent two samples, and then heartbeats with `state` until 9 s.
     fn is_lost(transmission: u8, timer: u16, cob_id: u32, state: NmtState, end: u64) -> bool {
         let id = NodeId::new(5).expect("a node-ID");
         let mut node = Node::new(id);

@@ -3,7 +3,7 @@
 use crate::bus::Mono;
 use std::time::Duration;
 
-/// Equal events are reported once, and then as a count per this interval.
+/// The first of equal events is reported at once. Then their number is reported at this interval.
 const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
 
 /// The events that were reported less than [`REPEAT_INTERVAL`] ago.
@@ -38,7 +38,8 @@ impl<T: Copy> Repetitions<T> {
         true
     }
 
-    /// An event that was repeated, and how often since it was last reported. `at_end` does not wait for the interval.
+    /// Returns an event that was repeated, and the number of repetitions since its last report. With `at_end`, the
+    /// interval need not be over.
     pub(super) fn next(&mut self, now: Mono, at_end: bool) -> Option<(T, u64)> {
         let is_over = |recent: &Recent<T>| at_end || now.since(recent.reported) >= REPEAT_INTERVAL;
         self.recent.retain(|recent| recent.count > 0 || !is_over(recent));

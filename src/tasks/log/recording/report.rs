@@ -44,11 +44,12 @@ impl Recording<'_> {
         }
     }
 
-    /// The nodes of a passive recording whose TPDOs are known. They are empty if no signals were requested: then nothing
-    /// can be missing.
+    /// Returns the nodes of a passive recording whose TPDOs are known. If no signals were requested, none can be
+    /// missing, and no node is returned.
     pub(in crate::tasks::log) fn overheard_nodes(&self) -> Vec<Node> {
         let listener = self.listener.as_ref().filter(|_| !self.options.wanted.is_empty());
-        let nodes = listener.into_iter().flat_map(|it| self.options.nodes.iter().map(|&node| it.known_node(node)));
+        let nodes =
+            listener.into_iter().flat_map(|listener| self.options.nodes.iter().map(|&node| listener.known_node(node)));
         nodes.filter(|node| !node.tpdos.is_empty()).collect()
     }
 
@@ -72,7 +73,7 @@ impl Recording<'_> {
         }
     }
 
-    /// The nodes with values that left OPERATIONAL according to their last heartbeat.
+    /// Returns a remark for each node that sent values, but left OPERATIONAL according to its last heartbeat.
     fn not_operational(&self) -> Vec<Remark> {
         let remark = |node: NodeId| {
             let observed = self.observed.get(&node)?;
@@ -89,7 +90,7 @@ impl Recording<'_> {
         self.liveness.nodes().filter_map(remark).collect()
     }
 
-    /// The reasons why nodes or single signals have no values.
+    /// Returns the reasons why nodes or single signals have no values.
     pub(super) fn silence_remarks(&self) -> Vec<Remark> {
         let silent = self.silent().into_iter().filter_map(|silent| {
             let signal = match silent {

@@ -11,7 +11,7 @@ use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, LogEvent, Mode, Observer, TICK};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The interval of checks whether the start commands were sent.
+/// The interval at which the loop checks whether the start commands were sent.
 const START_CHECK_INTERVAL: Duration = Duration::from_millis(1);
 
 /// The time for which the values of the first SYNC are kept. A second device with the same COB-ID answers within this
@@ -108,7 +108,7 @@ impl Recording<'_> {
         result
     }
 
-    /// The moment at which the loop must act if nothing is received.
+    /// Returns the moment at which the loop must act if nothing is received.
     fn next_deadline(&self, schedule: &Schedule, producer: Option<&Producer>) -> Mono {
         let give_up = (self.tally.rows == 0).then_some(schedule.give_up);
         let poll = self.poll.as_ref().map(|poll| poll.due(schedule.start));
@@ -198,8 +198,8 @@ impl Recording<'_> {
         }
     }
 
-    /// Handles Ctrl-C. After the first Ctrl-C, frames received before are still recorded. The second Ctrl-C
-    /// ends the recording immediately.
+    /// Handles Ctrl-C. After the first Ctrl-C, frames received earlier are still recorded. The second Ctrl-C ends the
+    /// recording immediately.
     fn interrupt(&mut self, schedule: &mut Schedule, master: &Master<'_>) -> Result<ControlFlow<()>, Error> {
         let is_second = std::mem::replace(&mut self.interrupted, true);
         if self.tally.rows == 0 && self.early.is_empty() {
@@ -213,7 +213,7 @@ impl Recording<'_> {
     }
 }
 
-/// The recording while it waits.
+/// The recording, and the state of its loop.
 struct Loop<'l, 'o> {
     recording: &'l mut Recording<'o>,
     schedule: Schedule,

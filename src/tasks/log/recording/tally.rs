@@ -87,7 +87,7 @@ impl Tally {
         self.end = self.end.max(at);
     }
 
-    /// Ends the recording at its last row. All rows may come from frames received before the start.
+    /// Sets the end to the last row. This may be before the start, if all rows come from frames received earlier.
     pub(super) fn end_at(&mut self, at: Mono) {
         self.end = at;
     }
