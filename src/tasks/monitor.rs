@@ -28,9 +28,9 @@ pub struct MonitorOptions {
     pub kinds: BTreeSet<FrameKind>,
     /// Whether repetitions are shown: heartbeats without a change, and error frames that repeat the last one.
     pub all: bool,
-    /// Ends after this time.
+    /// The monitor ends after this time.
     pub duration: Option<Duration>,
-    /// Ends after this number of messages.
+    /// The monitor ends after this number of messages.
     pub count: Option<u64>,
     /// Descriptions chosen by the user.
     pub overrides: Overrides,
@@ -53,8 +53,8 @@ pub struct MonitorReport {
     pub masters: BTreeSet<FrameKind>,
 }
 
-/// The descriptions of the devices whose identity is read in a recording. The names and types of their objects are then
-/// known from the first frame on.
+/// Returns the descriptions of the devices whose identity is read in a recording. With them, the names and types of
+/// objects are known from the first frame on.
 ///
 /// # Errors
 /// The recording cannot be read.

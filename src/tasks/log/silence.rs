@@ -40,7 +40,7 @@ pub(super) struct Questions {
     pub(super) findings: BTreeMap<NodeId, Findings>,
 }
 
-/// Why a recording has no rows.
+/// Returns why a recording has no rows.
 pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Failure {
     let within = waited(options);
     if let Some(failure) = recording.two_devices.values().next() {
@@ -83,7 +83,7 @@ fn waited(options: &LogOptions) -> Duration {
 }
 
 impl Recording<'_> {
-    /// The nodes without values, and the signals without values of nodes that send other values.
+    /// Returns the nodes without values, and the signals without values of nodes that send other values.
     pub(super) fn silent(&self) -> Vec<Silent> {
         let expected = |node: &&Node| self.is_expected(node.id);
         let mut silent = Vec::new();
@@ -99,8 +99,8 @@ impl Recording<'_> {
                 .collect();
             for &(at, name) in &own {
                 // A signal whose unit became known later has two sources.
-                let is_last = own.iter().all(|&(other, its)| its != name || other <= at);
-                if is_last && own.iter().all(|&(other, its)| its != name || self.count(other) == 0) {
+                let is_last = own.iter().all(|&(other, other_name)| other_name != name || other <= at);
+                if is_last && own.iter().all(|&(other, other_name)| other_name != name || self.count(other) == 0) {
                     silent.push(Silent::Source(node.id, at));
                 }
             }
@@ -108,21 +108,21 @@ impl Recording<'_> {
         silent
     }
 
-    /// Why a node or a source has no values.
+    /// Returns why a node or a source has no values.
     pub(super) fn silence(&self, silent: Silent) -> Silence {
         let id = silent.node();
-        let of_recording = Silence::of;
+        let without_evidence = Silence::of;
         if !self.link_is_up {
-            return of_recording(SilenceCause::InterfaceDown);
+            return without_evidence(SilenceCause::InterfaceDown);
         }
         if self.is_paused(id) {
-            return of_recording(SilenceCause::NotReadAgain);
+            return without_evidence(SilenceCause::NotReadAgain);
         }
         if let Some(error) = self.poll.as_ref().and_then(|poll| poll.error(silent)) {
-            return of_recording(SilenceCause::PollFailed(Box::new(error.clone())));
+            return without_evidence(SilenceCause::PollFailed(Box::new(error.clone())));
         }
         let Some(node) = self.nodes.iter().find(|node| node.id == id) else {
-            return of_recording(SilenceCause::NoTpdo);
+            return without_evidence(SilenceCause::NoTpdo);
         };
         let carries = |tpdo: &Tpdo| self.carries(silent, tpdo);
         let (observed, wrong_length) =
@@ -153,7 +153,7 @@ impl Recording<'_> {
         }
     }
 
-    /// A COB-ID that two TPDOs share, if one of them contains requested values.
+    /// Returns a COB-ID that two TPDOs share, if one of the TPDOs contains requested values.
     fn shared_cob_id(
         &self,
         node: &Node,
@@ -166,7 +166,7 @@ impl Recording<'_> {
         })
     }
 
-    /// The objects to read from silent nodes. Polled nodes are not asked: the polls already show the reason.
+    /// Returns the objects to read from silent nodes. Polled nodes are omitted: the polls already show the reason.
     fn objects_to_read(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
         if matches!(self.options.mode, Mode::Poll(_) | Mode::Passive) || !self.link_is_up || self.interface.is_none() {
             return Vec::new();

@@ -17,13 +17,13 @@ use std::time::Duration;
 /// The profiles of sensors.
 const SENSOR_PROFILES: [u32; 3] = [profiles::MEASURING, profiles::ENCODER, profiles::INCLINOMETER];
 
-/// If the heartbeat is slower, the state of a node is unknown.
+/// If the heartbeat period of a node is longer, its state is treated as unknown.
 const MAX_HEARTBEAT_PERIOD: Duration = Duration::from_secs(2);
 
-/// The interval of checks whether the last commands were sent.
+/// The interval at which the program checks whether the last commands were sent.
 const SEND_INTERVAL: Duration = Duration::from_millis(10);
 
-/// The wait for heartbeats that confirm the previous states.
+/// The waiting time for heartbeats that confirm the previous states.
 const CONFIRMATION_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// The nodes that were started, and their previous states.
@@ -95,16 +95,17 @@ impl NmtStates {
             _ => None,
         };
         let started = self.started.iter();
-        let mut open: BTreeMap<_, _> = started.filter_map(|(&node, &before)| Some((node, command(before)?))).collect();
-        for (&node, command) in &open {
+        let mut unconfirmed: BTreeMap<_, _> =
+            started.filter_map(|(&node, &before)| Some((node, command(before)?))).collect();
+        for (&node, command) in &unconfirmed {
             master.send(command.frame(Some(node)));
         }
         while master.is_sending() {
-            // Ctrl-C does not interrupt this.
+            // Ctrl-C does not interrupt this wait.
             let until = master.now() + SEND_INTERVAL;
             wait(master, until, Policy::Observe, |_, _| ControlFlow::<()>::Continue(()))?;
         }
-        if open.is_empty() {
+        if unconfirmed.is_empty() {
             return Ok(());
         }
         let (mut asked_again, mut other_states) = (BTreeSet::new(), BTreeMap::new());
@@ -112,10 +113,10 @@ impl NmtStates {
         wait(master, until, Policy::Observe, |master, event| {
             if let Happening::Frame(received) = event
                 && let Some((node, Life::State(state))) = Life::parse(&received.frame)
-                && let Some(&command) = open.get(&node)
+                && let Some(&command) = unconfirmed.get(&node)
             {
                 if state == command.target() {
-                    open.remove(&node);
+                    unconfirmed.remove(&node);
                     other_states.remove(&node);
                 } else if asked_again.insert(node) {
                     master.send(command.frame(Some(node)));
@@ -123,7 +124,7 @@ impl NmtStates {
                     other_states.insert(node, (state, command.target()));
                 }
             }
-            if open.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if unconfirmed.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         match other_states.pop_first() {
             Some((node, (state, wanted))) => Err(Failure::at(node, NmtFailure::OtherState { state, wanted })),
@@ -131,8 +132,8 @@ impl NmtStates {
         }
     }
 
-    /// The started nodes that stay operational because their previous state is unknown, and the nodes that were not
-    /// started.
+    /// Returns remarks about the nodes that stay operational because their previous state is unknown, and about the
+    /// nodes that were not started.
     pub(super) fn remarks(&self) -> impl Iterator<Item = Remark> + use<> {
         let remarks = [Remark::LeftOperational(self.left_operational()), Remark::NotStarted(self.not_started.clone())];
         remarks.into_iter().filter(
@@ -140,28 +141,28 @@ impl NmtStates {
         )
     }
 
-    /// The nodes that may not be in their previous state.
+    /// Returns effects about the nodes that may not be in their previous state.
     pub(super) fn effects(&self, is_restored: bool) -> Vec<Effect> {
         let left = Some(self.left_operational()).filter(|nodes| !nodes.is_empty());
         let failed = (!is_restored).then_some(Effect::State(StateEffect::NotRestored));
         left.map(Effect::LeftOperational).into_iter().chain(failed).collect()
     }
 
-    /// The started nodes that stay operational because their previous state is unknown.
+    /// Returns the started nodes that stay operational because their previous state is unknown.
     fn left_operational(&self) -> Vec<NodeId> {
         self.started.iter().filter(|(_, before)| before.is_none()).map(|(&node, _)| node).collect()
     }
 }
 
-/// Whether a recording starts the node: a device of a description, or of a profile of sensors. Others, such as drives,
-/// may move something. A device without profile is treated as a sensor.
+/// Whether a recording may start the node: its description has signals, or its profile is a profile of sensors. Other
+/// devices, such as drives, may move something. A device without a profile is treated as a sensor.
 fn is_sensor(node: &Node) -> bool {
     let is_described = node.model.as_ref().is_some_and(|model| !model.description.signals.is_empty());
     let profile = node.identity.profile().filter(|&profile| profile != 0);
     is_described || profile.is_none_or(|profile| SENSOR_PROFILES.contains(&profile))
 }
 
-/// The states from heartbeats. Waits as long as the slowest heartbeat needs.
+/// Returns the states in the heartbeats of the nodes. Waits as long as the slowest heartbeat needs.
 fn heartbeats(
     master: &mut Master<'_>,
     nodes: &[Node],

@@ -7,13 +7,13 @@ use super::device::{Descriptions, LssDevice};
 use super::event::LssEvent;
 use super::failure::{LssCause, LssEffect, NextStep, NotReset};
 use super::method::{PlannedRate, RequestedRate, check_objects, choose_method, objects_instead, plan_rate};
-use super::node_id::taken;
+use super::node_id::find_taken_sign;
 use super::objects::by_objects;
 use super::progress::{Progress, Stage};
 use super::resolve::resolve;
 use super::retime::{Retiming, needs_host_change};
 use super::services::{accepted_by_all, unchanged};
-use super::session::{Session, is_silent, prepared, restore_state};
+use super::session::{Session, in_required_state, is_silent, restore_state};
 use super::{Notify, Target, Via};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
@@ -51,7 +51,7 @@ pub struct Job<'a> {
 pub struct Assigned {
     /// The device as the user named it.
     pub target: Target,
-    /// Its node-ID before; `None` if it had none or it is unknown.
+    /// Its previous node-ID; `None` if it had none or it is unknown.
     pub old: Option<NodeId>,
     /// Its new node-ID; `None` if only the bit rate was set.
     pub new: Option<NodeId>,
@@ -59,7 +59,7 @@ pub struct Assigned {
     pub rate: Option<PlannedRate>,
     /// Whether the host works at the new bit rate.
     pub retimed: bool,
-    /// Whether both are stored.
+    /// Whether node-ID and bit rate are stored.
     pub stored: bool,
     /// The confirmation.
     pub confirmed: Confirmed,
@@ -82,7 +82,7 @@ pub fn assign(master: &mut Master<'_>, job: &Job<'_>, notify: Notify<'_>) -> Res
     let mut work = Work { job, device: &device, method, rate, progress: Progress::new(job.id, rate) };
     let mut result = work.carry_out(master, notify);
     if let Err(failure) = &result
-        && let Some(objects) = work.objects_after(failure)
+        && let Some(objects) = work.objects_instead_of_lss(failure)
     {
         notify(device.note(LssEvent::ObjectsInsteadOfLss));
         result = check_objects(&device, &objects, job.store, notify).and_then(|()| {
@@ -112,7 +112,7 @@ fn prepare(
     }
     let changes_to = job.id.filter(|new| device.node != Some(*new));
     if let Some(new) = job.id.filter(|_| changes_to.is_some() || !device.is_alone)
-        && let Some(sign) = taken(master, new, start)?
+        && let Some(sign) = find_taken_sign(master, new, start)?
     {
         return Err(device.failure(LssCause::Taken(new, sign)));
     }
@@ -135,8 +135,8 @@ impl Work<'_> {
         let (job, device) = (self.job, self.device);
         let mut report = self.report();
         let needs_host_change = needs_host_change(master, self.rate);
-        let follows = job.retime && needs_host_change;
-        if let (true, Some(rate)) = (follows, self.rate) {
+        let host_follows = job.retime && needs_host_change;
+        if let (true, Some(rate)) = (host_follows, self.rate) {
             let retiming = Retiming::new(master, job, device, &self.method, rate)?;
             let is_complete = retiming.carry_out(master, &mut self.progress, notify)?;
             (report.retimed, report.confirmed) = (true, Confirmed::Identity);
@@ -146,15 +146,15 @@ impl Work<'_> {
             }
         }
         let booted = match self.method.kind {
-            AssignKind::Lss => self.by_lss(master, follows, follows || !needs_host_change, notify)?,
+            AssignKind::Lss => self.by_lss(master, host_follows, host_follows || !needs_host_change, notify)?,
             AssignKind::Objects => {
                 by_objects(master, device, &self.method, job.store, &mut self.progress)?;
                 false
             }
         };
         notify(device.note(LssEvent::Progress(self.progress.clone())));
-        // After a reset, the device would use a bit rate different from that of the host.
-        let Some(new) = job.id.filter(|_| follows || !needs_host_change) else { return Ok(report) };
+        // After a reset, the device would use a different bit rate than the host.
+        let Some(new) = job.id.filter(|_| host_follows || !needs_host_change) else { return Ok(report) };
         (report.confirmed, report.boot_time) = confirm(master, device, new, self.node_to_reset(new)?, booted)?;
         report.cob_ids = self.cob_ids(master)?;
         Ok(report)
@@ -181,7 +181,7 @@ impl Work<'_> {
         Ok(Some(cob_ids(master, new, self.device.node, self.device.model.as_deref())?))
     }
 
-    /// The node to reset; `None` if the device boots by itself.
+    /// Returns the node to reset; `None` if the device boots by itself.
     ///
     /// # Errors
     /// A reset would reach another device, or the node-ID is unknown.
@@ -199,15 +199,15 @@ impl Work<'_> {
     fn by_lss(
         &mut self,
         master: &mut Master<'_>,
-        has_rate: bool,
+        rate_is_set: bool,
         resets: bool,
         notify: Notify<'_>,
     ) -> Result<bool, Failure> {
         let (job, device, progress) = (self.job, self.device, &mut self.progress);
         let table = RateTable::of(device.description(), AssignKind::Lss);
         let old_rate = master.bus().bit_rate().and_then(|rate| table.index_of(rate));
-        let session: Session<()> = prepared(master, device, &self.method, notify, |lss| {
-            let result = configure(lss, job, !has_rate, progress).map_err(|error| device.lss_failure(error));
+        let session: Session<()> = in_required_state(master, device, &self.method, notify, |lss| {
+            let result = configure(lss, job, !rate_is_set, progress).map_err(|error| device.lss_failure(error));
             if result.is_err() && progress.is_pending() {
                 revert(lss, device, old_rate, progress);
             }
@@ -221,15 +221,15 @@ impl Work<'_> {
         Ok(new.is_some_and(|new| session.booted.contains(&new)))
     }
 
-    /// The objects to use if the device does not answer LSS. Nothing may be changed yet, and the user must not have
-    /// chosen the method.
-    fn objects_after(&self, failure: &Failure) -> Option<AssignEntry> {
+    /// Returns the objects to use if the device does not answer LSS. They are used only if nothing was changed yet and
+    /// the user did not choose the method.
+    fn objects_instead_of_lss(&self, failure: &Failure) -> Option<AssignEntry> {
         let is_lss = self.job.via == Via::Auto && self.method.kind == AssignKind::Lss && !self.job.retime;
         let is_silent = is_lss && is_silent(self.device, failure) && self.progress.stored == Stage::NotDone;
         objects_instead(self.device, self.job.store).filter(|_| is_silent)
     }
 
-    /// The failure with the completed steps and the next step.
+    /// Adds the completed steps and the next step to a failure.
     fn explain(&self, mut failure: Failure) -> Failure {
         if self.progress.is_unchanged() {
             return unchanged(failure);
@@ -268,14 +268,14 @@ fn configure(lss: &mut Lss<'_, '_>, job: &Job<'_>, with_rate: bool, progress: &m
 /// ignored, because the first failure is reported.
 fn revert(lss: &mut Lss<'_, '_>, device: &LssDevice, old_rate: Option<u8>, progress: &mut Progress) {
     if let Some((_, stage)) = &mut progress.id
-        && stage.may_hold()
+        && stage.may_be_set()
         && (device.node.is_some() || device.is_unconfigured)
         && lss.configure_node_id(device.node).is_ok()
     {
         *stage = Stage::Reverted;
     }
     if let (Some((_, stage)), Some(index)) = (&mut progress.rate, old_rate)
-        && stage.may_hold()
+        && stage.may_be_set()
         && !progress.is_retimed
         && lss.configure_bit_timing(0, index).is_ok()
     {

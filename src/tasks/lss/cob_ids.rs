@@ -35,7 +35,7 @@ pub struct StaleCobId {
     pub expected: u32,
 }
 
-/// Reads 1014h and 1800h:1 to 1803h:1 of a node. `old` is its node-ID before.
+/// Reads 1014h and 1800h:1 to 1803h:1 of a node. `old` is its previous node-ID.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C. Objects that cannot be read are omitted.

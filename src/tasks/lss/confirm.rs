@@ -12,8 +12,8 @@ use crate::tasks::Failure;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The longest wait for a boot-up message. No manual gives a time. A device may first write its
-/// non-volatile memory.
+/// The longest wait for a boot-up message. No manual gives a time, and a device may first write its non-volatile
+/// memory.
 const BOOT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// How long requests are repeated after the boot-up message. Some devices do not answer for 2 to 3 s.
@@ -92,7 +92,8 @@ fn boot_up(master: &mut Master<'_>, new: NodeId, start: Mono) -> Result<Option<D
     Ok(booted.done())
 }
 
-/// The device that answers at the new node-ID. After a boot-up message, requests to a silent device are repeated.
+/// Returns the device that answers at the new node-ID. After a boot-up message, requests to a silent device are
+/// repeated.
 fn first_answer(master: &mut Master<'_>, new: NodeId, has_booted: bool) -> Result<AnsweringDevices, Failure> {
     let until = master.now() + FIRST_ANSWER_TIMEOUT;
     loop {
@@ -105,7 +106,7 @@ fn first_answer(master: &mut Master<'_>, new: NodeId, has_booted: bool) -> Resul
     }
 }
 
-/// The failure of a device that does not respond at its new node-ID.
+/// Returns the failure of a device that does not respond at its new node-ID.
 fn not_seen(
     master: &mut Master<'_>,
     device: &LssDevice,

@@ -50,7 +50,7 @@ pub(super) struct LssDevice {
 }
 
 impl LssDevice {
-    /// The device with this identity; no other facts are known.
+    /// Creates a device of which only the identity is known.
     pub(super) fn with_address(address: LssAddress) -> LssDevice {
         LssDevice {
             address: Some(address),
@@ -77,12 +77,12 @@ impl LssDevice {
         self.model.as_ref().map(|model| &model.description)
     }
 
-    /// The device as a node for SDO.
+    /// Returns the device as a node for SDO.
     pub(super) fn as_node(&self, node: NodeId) -> Node {
         Node { model: self.model.clone(), is_identified: true, ..Node::new(node) }
     }
 
-    /// Whether its node-ID is set by LSS.
+    /// Whether the node-ID of the device is set by LSS.
     pub(super) fn uses_lss(&self, via: Via) -> bool {
         let preferred = self.description().and_then(Description::preferred_assign);
         match via {
@@ -92,12 +92,12 @@ impl LssDevice {
         }
     }
 
-    /// A failure of this device.
+    /// Creates a failure of this device.
     pub(super) fn failure(&self, cause: LssCause) -> Failure {
         Failure { node: self.node, ..Failure::general(LssFailure { device: self.name(), cause }) }
     }
 
-    /// The failure of an LSS service with this device.
+    /// Converts the error of an LSS service to a failure of this device.
     pub(super) fn lss_failure(&self, error: LssError) -> Failure {
         match error {
             LssError::Master(error) => error.into(),
@@ -105,7 +105,7 @@ impl LssDevice {
         }
     }
 
-    /// A note about this device.
+    /// Creates a note about this device.
     pub(super) fn note(&self, event: LssEvent) -> Note {
         Note { node: self.node, fact: LssFact { device: self.name(), event }.into() }
     }
@@ -121,7 +121,7 @@ pub struct Descriptions<'a> {
 }
 
 impl Descriptions<'_> {
-    /// The description of a device: the description that the user chose, else that of its SDO answers, else that of its
+    /// Returns the description of a device: chosen by the user, else found from its SDO answers, else from its
     /// identity.
     ///
     /// # Errors

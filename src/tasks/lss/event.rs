@@ -26,7 +26,7 @@ pub enum LssEvent {
         /// The new node-ID, if it was found to be free.
         free: Option<NodeId>,
     },
-    /// The bit rate table of the device is unknown; that of CiA 305 is used.
+    /// The bit rate table of the device is unknown; the table of CiA 305 is used.
     StandardRateTable,
     /// The completed steps of the change.
     Progress(Progress),
@@ -61,7 +61,7 @@ pub enum LssEvent {
     SharedNodeId(NodeId),
     /// Several slaves are on the bus, and all of them accept the change.
     AllSlavesChange(AnotherSlave),
-    /// The slave lacks a service, so LSS cannot show that it is the only one.
+    /// The slave lacks a service, so LSS cannot show that it is the only slave.
     CannotExcludeOthers(UnansweredService),
     /// Fastscan stopped after this device; there may be further devices.
     MoreUnconfigured {
@@ -104,9 +104,9 @@ impl LssEvent {
 /// A service that a slave does not answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnansweredService {
-    /// 5Ah to 5Dh.
+    /// The inquiry services (5Ah to 5Dh).
     Inquire,
-    /// 46h to 4Bh.
+    /// The identify service (46h to 4Bh).
     Identify,
 }
 

@@ -75,7 +75,7 @@ pub enum LssCause {
         rates: Vec<u32>,
         /// Whether the device can detect the bit rate.
         has_auto: bool,
-        /// Whether the table is that of CiA 305.
+        /// Whether the table of CiA 305 was used.
         is_standard: bool,
     },
     /// The bit rate codes of the device are unknown.

@@ -26,23 +26,23 @@ pub struct FoundSlave {
 /// How long a search waits for devices without a node-ID.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchTimes {
-    /// The wait for an answer of any device, from the first request. Devices with a node-ID are searched meanwhile.
+    /// The waiting time for the first answer, from the first request. Devices with a node-ID are searched meanwhile.
     pub first: Duration,
-    /// The wait for an answer of further devices, after each of two requests. `None`: the time-out, and once more with
+    /// The waiting time for further devices, after each of two requests. `None`: the time-out, and once more with
     /// pauses between the frames.
     pub further: Option<Duration>,
 }
 
 impl Default for SearchTimes {
-    /// 450 ms for the first device, which also has the time to need pauses between frames. All devices hear the first
-    /// request, and most have answered it while the node-IDs are scanned. So the wait for further devices is short.
+    /// 450 ms for the first device, which is enough for a device that needs pauses between frames. All devices receive
+    /// the first request, and most answer it while the node-IDs are scanned. So the wait for further devices is short.
     fn default() -> SearchTimes {
         SearchTimes { first: Duration::from_millis(450), further: Some(Duration::from_millis(75)) }
     }
 }
 
 impl SearchTimes {
-    /// For slow devices: every wait has at least this time-out.
+    /// Returns times for slow devices: every wait is at least as long as this time-out.
     pub fn patient(timeout: Duration) -> SearchTimes {
         SearchTimes { first: timeout, further: None }
     }
@@ -57,7 +57,7 @@ impl SearchTimes {
 pub fn scan(master: &mut Master<'_>, times: SearchTimes, notify: Notify<'_>) -> Result<Vec<FoundSlave>, Failure> {
     master.listen(&Filters::All)?;
     let asked = master.lss().ask_unconfigured()?;
-    let mut slaves: Vec<FoundSlave> = nodes::identified(master)?
+    let mut slaves: Vec<FoundSlave> = nodes::find_identified(master)?
         .into_iter()
         .map(|found| FoundSlave {
             node: Some(found.node),
@@ -72,9 +72,9 @@ pub fn scan(master: &mut Master<'_>, times: SearchTimes, notify: Notify<'_>) -> 
         Ok(false) => Ok(Vec::new()),
         Err(error) => Err(error),
     };
-    let left = lss.leave();
+    let leave_result = lss.leave();
     let unconfigured = unconfigured?;
-    left?;
+    leave_result?;
     slaves.extend(unconfigured.into_iter().map(|address| {
         let model = catalog::by_identity(address.vendor, address.product);
         FoundSlave { node: None, address: Some(address), model }
@@ -98,7 +98,7 @@ fn unconfigured(
             }
             Ok(Some(_)) => None,
             Err(error @ (LssError::Master(_) | LssError::Disturbed(_))) => return Err(error),
-            // Without any device the error is the result.
+            // If no device was found, the error is the result.
             Err(error) if found.is_empty() => return Err(error),
             Err(error) => Some(Reason(Arc::new(error))),
         };

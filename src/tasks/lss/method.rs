@@ -15,7 +15,7 @@ use crate::tasks::Failure;
 pub enum RequestedRate {
     /// In bit/s.
     Bits(u32),
-    /// The device detects it.
+    /// The device detects the bit rate.
     Auto,
     /// An index in the table of the device, and its bit rate in bit/s if the user stated it.
     Index(u8, Option<u32>),
@@ -28,11 +28,11 @@ pub struct PlannedRate {
     pub index: u8,
     /// In bit/s; `None` if it is unknown.
     pub bits: Option<u32>,
-    /// Whether the device detects it.
+    /// Whether the device detects the bit rate.
     pub is_auto: bool,
 }
 
-/// "Store all parameters".
+/// The object "store all parameters".
 const STORE_ALL: ObjectId = ObjectId::new(0x1010, 1);
 
 /// Chooses the method. `store` is `true` if the new values are stored.
@@ -64,10 +64,11 @@ pub(super) fn choose_method(
     Ok(entry)
 }
 
-/// The objects to use if the device does not answer LSS. They must be confirmed by a document, reachable, and stored.
+/// Returns the objects to use if the device does not answer LSS. They must be confirmed by a document, reachable, and
+/// stored.
 pub(super) fn objects_instead(device: &LssDevice, store: bool) -> Option<AssignEntry> {
     let entry = device.description()?.assign_of_kind(AssignKind::Objects)?;
-    let is_usable = !entry.unverified && device.own_node().is_some() && needs_store(entry, store).is_ok();
+    let is_usable = !entry.unverified && device.own_node().is_some() && refuse_without_store(entry, store).is_ok();
     is_usable.then(|| entry.clone())
 }
 
@@ -84,7 +85,7 @@ pub(super) fn check_objects(
     if device.own_node().is_none() {
         return Err(device.failure(LssCause::ObjectsOutOfReach));
     }
-    needs_store(entry, store).map_err(|cause| device.failure(cause))?;
+    refuse_without_store(entry, store).map_err(|cause| device.failure(cause))?;
     if entry.unverified {
         notify(device.note(LssEvent::UnverifiedMethod { doubt: entry.doubt.clone() }));
     }
@@ -96,7 +97,7 @@ pub(super) fn check_objects(
     Ok(())
 }
 
-/// The index of a bit rate in the table of the device.
+/// Looks up a bit rate in the table of the device.
 ///
 /// # Errors
 /// [`LssCause::NoSuchRate`] with the rates of the table.
@@ -141,7 +142,7 @@ pub fn check_rate(description: &Description, rate: RequestedRate, via: Via) -> R
         Via::Lss => AssignKind::Lss,
         Via::Sdo => AssignKind::Objects,
     };
-    plan_rate(Some(description), rate, method).map_err(of_no_device).map(|_| ())
+    plan_rate(Some(description), rate, method).map_err(general_failure).map(|_| ())
 }
 
 /// Checks that a device with this description can be set without storing, before the bus is opened.
@@ -154,21 +155,21 @@ pub fn check_store(description: &Description, store: bool, via: Via) -> Result<(
         Via::Lss => None,
         Via::Sdo => description.assign_of_kind(AssignKind::Objects),
     };
-    entry.map_or(Ok(()), |entry| needs_store(entry, store)).map_err(of_no_device)
+    entry.map_or(Ok(()), |entry| refuse_without_store(entry, store)).map_err(general_failure)
 }
 
-fn of_no_device(cause: LssCause) -> Failure {
+fn general_failure(cause: LssCause) -> Failure {
     Failure::general(LssFailure::general(cause))
 }
 
-fn needs_store(entry: &AssignEntry, store: bool) -> Result<(), LssCause> {
+fn refuse_without_store(entry: &AssignEntry, store: bool) -> Result<(), LssCause> {
     match entry.kind {
         AssignKind::Objects if !store => Err(LssCause::NeedsStore(entry.store)),
         AssignKind::Objects | AssignKind::Lss => Ok(()),
     }
 }
 
-/// The object of a method for a setting.
+/// Returns the object of a method for a setting.
 ///
 /// # Errors
 /// [`LssCause::NoObject`].

@@ -18,7 +18,7 @@ const IDENTITY: u16 = 0x1018;
 /// The number of reads of an identity. The answers of two devices can merge on the bus once, but not every time.
 const IDENTITY_READS: usize = 3;
 
-/// The wait for a second answer after an identity was read.
+/// The waiting time for a second answer after an identity was read.
 const SECOND_ANSWER_TIMEOUT: Duration = Duration::from_millis(50);
 
 /// How long to listen for other nodes. The usual heartbeat time is 1 s.
@@ -174,15 +174,19 @@ fn is_collision(fault: Fault) -> bool {
     matches!(fault, Fault::Protocol | Fault::ErrorPassive | Fault::BusOff)
 }
 
-/// Whether a node-ID is in use: an SDO answer, a heartbeat or a boot-up message. A stopped node without heartbeat
-/// cannot be detected.
+/// Returns the sign that a node-ID is in use: an SDO answer, a heartbeat or a boot-up message. A stopped node without
+/// heartbeat cannot be detected.
 ///
-/// What was received since `start` counts too: the node must be silent for [`LISTEN_TIME`], and after two requests. So
-/// requests of a scan are not repeated.
+/// The node-ID is free if the node is silent for [`LISTEN_TIME`] after `start`, and after two requests. Frames received
+/// since `start` count, so the requests of a scan are not repeated.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.
-pub(super) fn taken(master: &mut Master<'_>, node: NodeId, start: Mono) -> Result<Option<TakenSign>, Failure> {
+pub(super) fn find_taken_sign(
+    master: &mut Master<'_>,
+    node: NodeId,
+    start: Mono,
+) -> Result<Option<TakenSign>, Failure> {
     master.listen(&Filters::All)?;
     let timeout = master.timing().timeout.min(LISTEN_TIME / 3);
     let sign = |master: &Master<'_>| match () {
@@ -207,21 +211,21 @@ pub(super) fn taken(master: &mut Master<'_>, node: NodeId, start: Mono) -> Resul
 
 /// Reads the device type twice, until the first answer or sign of life.
 fn ask_twice(master: &mut Master<'_>, node: NodeId, timeout: Duration) -> Result<(), Failure> {
-    // One of them or its answer may be lost.
+    // One request or its answer may be lost.
     let start = master.now();
     let requests = [(); 2].map(|()| Request::read(node, ObjectId::DEVICE_TYPE).once().within(timeout));
     let tickets = requests.map(|request| master.start(request));
-    let mut open = tickets.len();
+    let mut unanswered = tickets.len();
     wait(master, start + MAX_TRANSFER_TIME, Policy::Command, |master, event| {
-        open -= usize::from(matches!(event, Happening::Sdo(ticket, _) if tickets.contains(&ticket)));
+        unanswered -= usize::from(matches!(event, Happening::Sdo(ticket, _) if tickets.contains(&ticket)));
         let is_found = master.has_answered_since(node, start) || master.has_heartbeat_since(node, start);
-        if open == 0 || is_found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if unanswered == 0 || is_found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     master.forget(tickets.into_iter());
     Ok(())
 }
 
-/// The identity of the only device with a node-ID.
+/// Returns the identity of the only device with a node-ID.
 ///
 /// # Errors
 /// No device, more than one, or a device without a serial number; bus errors and Ctrl-C.

@@ -45,8 +45,8 @@ pub(super) fn by_objects(
         None => None,
     };
     enter_state(master, device, method.state)?;
-    let old_id = previous(master, id, new_id)?;
-    let old_rate = previous(master, id, new_rate)?;
+    let old_id = read_previous(master, id, new_id)?;
+    let old_rate = read_previous(master, id, new_rate)?;
     let result = write_all(master, device, &node, method.store.filter(|_| store), (new_id, new_rate), progress);
     // A method without a store object stores the values by itself.
     if result.is_ok() && method.store.is_none() {
@@ -110,9 +110,9 @@ fn write_bytes(
     result.map(|_| ()).map_err(Failure::from)
 }
 
-/// The number in an object: its lowest byte. `None` if the device does not return it; the number then cannot be
-/// restored.
-fn previous(master: &mut Master<'_>, node: NodeId, write: Write) -> Result<Write, Error> {
+/// Reads the number in an object (its lowest byte). Returns `None` if the device does not return it. The number then
+/// cannot be restored.
+fn read_previous(master: &mut Master<'_>, node: NodeId, write: Write) -> Result<Write, Error> {
     let Some((object, _)) = write else { return Ok(None) };
     let answer = master.transfer_one(Request::read(node, object.object))?;
     let uploaded = answer.ok().and_then(|answer| answer.uploaded);
@@ -130,8 +130,8 @@ fn revert(
     let id = id.zip(progress.id.as_mut().map(|(_, stage)| stage));
     let rate = rate.zip(progress.rate.as_mut().map(|(_, stage)| stage));
     for ((object, number), stage) in id.into_iter().chain(rate) {
-        let mut of_write = *stage;
-        if stage.may_hold() && write_number(master, device, node, object, number, &mut of_write).is_ok() {
+        let mut revert_stage = *stage;
+        if stage.may_be_set() && write_number(master, device, node, object, number, &mut revert_stage).is_ok() {
             *stage = Stage::Reverted;
         }
     }

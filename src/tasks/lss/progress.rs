@@ -29,7 +29,7 @@ impl Stage {
     }
 
     /// Whether the device may have the new value.
-    pub(super) fn may_hold(self) -> bool {
+    pub(super) fn may_be_set(self) -> bool {
         matches!(self, Stage::Sent | Stage::Done)
     }
 }
@@ -41,7 +41,7 @@ pub struct Progress {
     pub id: Option<(NodeId, Stage)>,
     /// The new bit rate, if requested.
     pub rate: Option<(PlannedRate, Stage)>,
-    /// Whether both are stored.
+    /// The progress of storing both.
     pub stored: Stage,
     /// Whether the host works at the new bit rate.
     pub is_retimed: bool,
@@ -63,18 +63,18 @@ impl Progress {
 
     /// Whether the device may have a new value that is not stored.
     pub(super) fn is_pending(&self) -> bool {
-        self.stored == Stage::NotDone && self.stages().any(Stage::may_hold)
+        self.stored == Stage::NotDone && self.stages().any(Stage::may_be_set)
     }
 
     /// Whether the device is certainly unchanged.
     pub(super) fn is_unchanged(&self) -> bool {
-        self.stored == Stage::NotDone && !self.is_retimed && !self.stages().any(Stage::may_hold)
+        self.stored == Stage::NotDone && !self.is_retimed && !self.stages().any(Stage::may_be_set)
     }
 
     /// Records a step of the bit rate.
     pub(super) fn set_rate(&mut self, stage: Stage) {
-        if let Some((_, of_rate)) = &mut self.rate {
-            *of_rate = stage;
+        if let Some((_, rate_stage)) = &mut self.rate {
+            *rate_stage = stage;
         }
     }
 }

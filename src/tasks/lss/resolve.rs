@@ -1,10 +1,10 @@
-//! Finds the device of an argument: its identity, its node-ID, and its address for LSS.
+//! Finds the device that an argument names: its identity, its node-ID, and its address for LSS.
 
 use super::device::{Descriptions, LssDevice};
 use super::event::LssEvent;
 use super::failure::{LssCause, LssFailure};
 use super::node_id::{AnsweringDevices, answering_devices, identity_of};
-use super::session::{configured, is_silent};
+use super::session::{in_configuration_state, is_silent};
 use super::sole::only_device;
 use super::{Notify, Target, Via, nodes};
 use crate::canopen::id::NodeId;
@@ -12,8 +12,8 @@ use crate::canopen::lss::LssAddress;
 use crate::master::{LssError, Master, OnTwoDevices};
 use crate::tasks::Failure;
 
-/// Finds the device of a target. Nothing is changed, and the device is switched back to waiting state.
-/// `force` is for [`Target::Only`].
+/// Finds the device of a target. Nothing is changed, and the device is switched back to waiting state. `force` applies
+/// to [`Target::Only`].
 ///
 /// # Errors
 /// No device, several devices, or a device that cannot be distinguished from others; bus errors and Ctrl-C.
@@ -67,7 +67,7 @@ fn by_address(
         LssNodeId::Known(Some(node)) => device.node = Some(node),
         LssNodeId::Known(None) => device.is_unconfigured = true,
         LssNodeId::NotSupported | LssNodeId::Silent(_) => {
-            device.node = nodes::with_identity(master, address)?.first().copied();
+            device.node = nodes::find_by_identity(master, address)?.first().copied();
         }
     }
     nodes::refuse_shared_identity(master, address, device.node)?;
@@ -96,9 +96,9 @@ fn by_address(
 fn unconfigured(master: &mut Master<'_>, descriptions: &Descriptions<'_>) -> Result<LssDevice, Failure> {
     let mut lss = master.lss();
     let found = lss.fastscan();
-    let left = lss.leave();
+    let leave_result = lss.leave();
     let found = found?;
-    left?;
+    leave_result?;
     drop(lss);
     let address = found.ok_or_else(|| Failure::general(LssFailure::general(LssCause::NoUnconfigured)))?;
     let mut device = LssDevice { is_unconfigured: true, ..LssDevice::with_address(address) };
@@ -123,7 +123,7 @@ enum LssNodeId {
 /// # Errors
 /// [`LssCause::SeveralWithIdentity`]; bus errors and Ctrl-C.
 fn inquire_node_id(master: &mut Master<'_>, device: &LssDevice) -> Result<LssNodeId, Failure> {
-    let asked = configured(master, device, |lss| match lss.inquire_node_id() {
+    let asked = in_configuration_state(master, device, |lss| match lss.inquire_node_id() {
         Ok(gathered) => Ok(Some(gathered)),
         Err(LssError::NoAnswer { .. }) => Ok(None),
         Err(error) => Err(device.lss_failure(error)),

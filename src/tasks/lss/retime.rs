@@ -11,7 +11,7 @@ use super::node_id::{AnsweringDevices, LISTEN_TIME, answering_devices};
 use super::nodes;
 use super::objects::by_objects;
 use super::progress::{Progress, Stage};
-use super::session::{PreviousState, configured, prepared, restore_state};
+use super::session::{PreviousState, in_configuration_state, in_required_state, restore_state};
 use crate::bus::{Filters, Mono};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtCommand;
@@ -28,13 +28,13 @@ use std::time::Duration;
 const DELAY_MS: u16 = 1000;
 const DELAY: Duration = Duration::from_millis(DELAY_MS as u64);
 
-/// Additional time for clocks and the interface.
+/// Additional time for inaccurate clocks and for the interface.
 const MARGIN: Duration = Duration::from_millis(50);
 
 /// How long to wait for an answer of the device at a bit rate.
 const SEARCH_TIME: Duration = Duration::from_secs(4);
 
-/// Whether the device may change to a bit rate different from that of the host.
+/// Whether the device may change to a different bit rate than the host.
 pub(super) fn needs_host_change(master: &Master<'_>, rate: Option<PlannedRate>) -> bool {
     rate.is_some_and(|rate| rate.bits.is_none() || rate.bits != master.bus().bit_rate())
 }
@@ -45,9 +45,9 @@ pub(super) struct Retiming<'a> {
     device: &'a LssDevice,
     method: &'a AssignEntry,
     index: u8,
-    /// The bit rate in bit/s.
+    /// The old bit rate in bit/s.
     old: u32,
-    /// The bit rate in bit/s.
+    /// The new bit rate in bit/s.
     new: u32,
 }
 
@@ -67,7 +67,7 @@ impl<'a> Retiming<'a> {
         let new = rate.bits.ok_or_else(|| refuse(HostObstacle::RateUnknown))?;
         let old = master.bus().bit_rate().ok_or_else(|| refuse(HostObstacle::NoBitRate))?;
         let name = master.bus().name().to_owned();
-        master.bus().can_set_bit_rate().map_err(|error| not_set(error, set_rate(name, new)))?;
+        master.bus().can_set_bit_rate().map_err(|error| not_set(error, host_action(name, new)))?;
         if method.kind == AssignKind::Objects && !job.store {
             return Err(refuse(HostObstacle::AppliesAfterStore));
         }
@@ -79,7 +79,7 @@ impl<'a> Retiming<'a> {
     }
 
     /// Changes device and host to the new bit rate. Returns whether the job is complete. A device that must store the
-    /// bit rate first also stores the node-ID.
+    /// bit rate before it uses it also stores the node-ID.
     ///
     /// # Errors
     /// The device does not answer at the new bit rate. The host then uses the old bit rate again.
@@ -99,7 +99,7 @@ impl<'a> Retiming<'a> {
     fn by_lss(&self, master: &mut Master<'_>, progress: &mut Progress, notify: Notify<'_>) -> Result<(), Failure> {
         let device = self.device;
         let mut activated = None;
-        let session = prepared(master, device, self.method, notify, |lss| {
+        let session = in_required_state(master, device, self.method, notify, |lss| {
             let result = lss.configure_bit_timing(0, self.index);
             progress.set_rate(Stage::after(&result));
             result.map_err(|error| device.lss_failure(error))?;
@@ -116,11 +116,11 @@ impl<'a> Retiming<'a> {
         };
         let start = activated.unwrap_or_else(|| master.now());
         notify(device.note(LssEvent::ChangingRate { bit_rate: self.new, delay_ms: DELAY_MS }));
-        let followed = self.set_host_bit_rate(master, start);
-        let followed = followed
+        let host_result = self.set_host_bit_rate(master, start);
+        let host_result = host_result
             .map_err(|failure| self.restore_host_bit_rate(master, failure, (start, previous), progress, notify));
         master.set_tolerates_outages(false);
-        followed?;
+        host_result?;
         progress.is_retimed = true;
         notify(device.note(LssEvent::AnswersAt { bit_rate: self.new }));
         if self.job.id.is_some() {
@@ -133,7 +133,7 @@ impl<'a> Retiming<'a> {
 
     /// Stores the new bit rate. Without a store, the device uses it until a power cycle.
     fn store(&self, master: &mut Master<'_>, progress: &mut Progress) -> Result<(), Failure> {
-        configured(master, self.device, |lss| {
+        in_configuration_state(master, self.device, |lss| {
             let result = lss.store();
             progress.stored = Stage::after(&result);
             result.map_err(|error| self.device.lss_failure(error))
@@ -146,7 +146,7 @@ impl<'a> Retiming<'a> {
         // No node acknowledges frames at a wrong bit rate.
         master.set_tolerates_outages(true);
         pause(master, start + DELAY + MARGIN, Policy::Reconnect)?;
-        set(master, self.new)?;
+        set_bus_rate(master, self.new)?;
         pause(master, start + DELAY * 2 + MARGIN, Policy::Reconnect)?;
         if answers(master, self.device, self.device.node)? {
             return Ok(());
@@ -178,7 +178,7 @@ impl<'a> Retiming<'a> {
             // Otherwise the next reset would activate the new bit rate.
             let index = RateTable::of(device.description(), self.method.kind).index_of(self.old);
             let is_reverted = index.is_some_and(|index| {
-                let revert = configured(master, device, |lss| {
+                let revert = in_configuration_state(master, device, |lss| {
                     lss.configure_bit_timing(0, index).map_err(|error| device.lss_failure(error))
                 });
                 revert.is_ok()
@@ -201,7 +201,7 @@ impl<'a> Retiming<'a> {
         master.send(NmtCommand::ResetNode.frame(device.node));
         let sent = master.now() + MARGIN;
         pause(master, sent, Policy::Reconnect)?;
-        set(master, self.new)?;
+        set_bus_rate(master, self.new)?;
         progress.is_retimed = true;
         master.set_tolerates_outages(true);
         let found = answers(master, device, self.job.id.or(device.node));
@@ -209,7 +209,7 @@ impl<'a> Retiming<'a> {
         if found? {
             return Ok(());
         }
-        let is_back = set(master, self.old).is_ok();
+        let is_back = set_bus_rate(master, self.old).is_ok();
         progress.is_retimed = false;
         Err(device.failure(LssCause::SilentAfterStore {
             bit_rate: self.new,
@@ -222,7 +222,7 @@ impl<'a> Retiming<'a> {
 /// Fails if another device is on the bus, because it would stay at the old bit rate and be disturbed.
 fn check_alone(master: &mut Master<'_>, device: &LssDevice) -> Result<(), Failure> {
     let refuse = |neighbour| device.failure(LssCause::NotAloneForRetime(neighbour));
-    if let Some(other) = nodes::on_bus(master)?.into_iter().find(|&node| device.node != Some(node)) {
+    if let Some(other) = nodes::find_ids(master)?.into_iter().find(|&node| device.node != Some(node)) {
         return Err(refuse(Neighbour::Node(other)));
     }
     if !device.is_unconfigured && master.lss().identify_unconfigured()? {
@@ -245,13 +245,13 @@ fn may_be_of(id: CanId, node: Option<NodeId>) -> bool {
     is_own || id == CanId::LSS_SLAVE
 }
 
-fn set_rate(interface: String, bit_rate: u32) -> HostAction {
+fn host_action(interface: String, bit_rate: u32) -> HostAction {
     HostAction::Up { interface, bit_rate: Some(bit_rate), listen_only: false }
 }
 
-fn set(master: &mut Master<'_>, bit_rate: u32) -> Result<(), Failure> {
+fn set_bus_rate(master: &mut Master<'_>, bit_rate: u32) -> Result<(), Failure> {
     let name = master.bus().name().to_owned();
-    master.set_bit_rate(bit_rate).map_err(|error| not_set(error, set_rate(name, bit_rate)))
+    master.set_bit_rate(bit_rate).map_err(|error| not_set(error, host_action(name, bit_rate)))
 }
 
 /// Whether the device answers at the present bit rate of the bus within [`SEARCH_TIME`].
@@ -274,7 +274,7 @@ fn answers(master: &mut Master<'_>, device: &LssDevice, node: Option<NodeId>) ->
     }
 }
 
-/// Whether the device answers SDO. A stopped device does not, so its LSS answer is used.
+/// Whether the device answers SDO. A stopped device does not answer SDO, so its LSS answer is used.
 fn answers_now(master: &mut Master<'_>, device: &LssDevice, node: Option<NodeId>) -> Result<bool, Failure> {
     if let Some(node) = node {
         match answering_devices(master, node)? {
@@ -286,5 +286,5 @@ fn answers_now(master: &mut Master<'_>, device: &LssDevice, node: Option<NodeId>
     }
     let Some(address) = device.address else { return Ok(false) };
     let by_identity = LssDevice { reach: Reach::Selective(address), ..device.clone() };
-    configured(master, &by_identity, |_| Ok(())).map(|_| true)
+    in_configuration_state(master, &by_identity, |_| Ok(())).map(|_| true)
 }

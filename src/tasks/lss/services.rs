@@ -5,7 +5,7 @@ use super::event::{LssEvent, Reason};
 use super::failure::LssCause;
 use super::method::choose_method;
 use super::resolve::resolve;
-use super::session::{prepared, restore_state};
+use super::session::{in_required_state, restore_state};
 use super::{Notify, Target, Via};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::{LssAddress, Mode};
@@ -27,7 +27,7 @@ pub struct Inquired {
 /// Reads identity and node-ID of a slave by LSS.
 ///
 /// # Errors
-/// As [`super::assign`]; [`LssCause::NoInquiry`].
+/// The errors of [`super::assign`]; [`LssCause::NoInquiry`].
 pub fn inquire(
     master: &mut Master<'_>,
     target: &Target,
@@ -50,7 +50,8 @@ pub fn inquire(
     Ok(Inquired { target: target.clone(), address, node })
 }
 
-/// The answer; `None` if there is none. An error that names another frame is added to `others`.
+/// Returns the answer, or `None` if the slave does not answer. If it sent another frame instead, the error is added to
+/// `others`.
 fn unless_silent<T>(result: Result<T, LssError>, others: &mut Vec<LssError>) -> Result<Option<T>, LssError> {
     match result {
         Ok(answer) => Ok(Some(answer)),
@@ -65,7 +66,7 @@ fn unless_silent<T>(result: Result<T, LssError>, others: &mut Vec<LssError>) -> 
 /// Stores the configured node-ID and bit rate in non-volatile memory.
 ///
 /// # Errors
-/// As [`super::assign`].
+/// The errors of [`super::assign`].
 pub fn store(
     master: &mut Master<'_>,
     target: &Target,
@@ -77,12 +78,11 @@ pub fn store(
     with_device(master, &device, notify, |lss| accepted_by_all(lss.store(), force))
 }
 
-/// Activates the configured bit rate. The slave is silent for
-/// `delay_ms`, changes the bit rate, and is silent for `delay_ms` again. `None` addresses all slaves. Slaves do not
-/// acknowledge the request.
+/// Activates the configured bit rate. The slave is silent for `delay_ms`, changes the bit rate, and is silent for
+/// `delay_ms` again. Without a target, all slaves are addressed. Slaves do not acknowledge the request.
 ///
 /// # Errors
-/// As [`super::assign`].
+/// The errors of [`super::assign`].
 pub fn activate(
     master: &mut Master<'_>,
     target: Option<&Target>,
@@ -94,9 +94,9 @@ pub fn activate(
     let Some(target) = target else {
         let mut lss = master.lss();
         let sent = lss.switch_global(Mode::Configuration).and_then(|()| lss.activate(delay_ms));
-        let left = lss.leave();
+        let leave_result = lss.leave();
         sent?;
-        return Ok(left?);
+        return Ok(leave_result?);
     };
     let device = resolve(master, target, descriptions, (Via::Lss, force), notify).map_err(unchanged)?;
     with_device(master, &device, notify, |lss| lss.activate(delay_ms))
@@ -110,13 +110,14 @@ fn with_device<T>(
     mut service: impl FnMut(&mut Lss<'_, '_>) -> Result<T, LssError>,
 ) -> Result<T, Failure> {
     let method = choose_method(device, Via::Lss, true, notify)?;
-    let session =
-        prepared(master, device, &method, notify, |lss| service(lss).map_err(|error| device.lss_failure(error)))?;
+    let session = in_required_state(master, device, &method, notify, |lss| {
+        service(lss).map_err(|error| device.lss_failure(error))
+    })?;
     restore_state(master, device, session.previous_state, notify);
     Ok(session.result)
 }
 
-/// The failure of a task before any change.
+/// Adds to a failure that nothing was changed.
 pub(super) fn unchanged(mut failure: Failure) -> Failure {
     failure.effects.push(Effect::NothingChanged);
     failure

@@ -29,7 +29,7 @@ pub(super) struct Session<T> {
 ///
 /// # Errors
 /// The device does not answer to its identity; errors of `work`.
-pub(super) fn configured<T>(
+pub(super) fn in_configuration_state<T>(
     master: &mut Master<'_>,
     device: &LssDevice,
     work: impl FnOnce(&mut Lss<'_, '_>) -> Result<T, Failure>,
@@ -40,9 +40,9 @@ pub(super) fn configured<T>(
         Reach::Selective(address) => lss.switch_selective(&address),
     };
     let result = entered.map_err(|error| device.lss_failure(error)).and_then(|()| work(&mut lss));
-    let left = lss.leave();
+    let leave_result = lss.leave();
     let result = result?;
-    left.map_err(|error| {
+    leave_result.map_err(|error| {
         let mut failure = device.lss_failure(error);
         failure.effects.push(LssEffect::MayBeConfiguring.into());
         failure
@@ -112,8 +112,8 @@ pub(super) fn restore_state(
 /// On success the caller restores the NMT state; on failure it is restored here.
 ///
 /// # Errors
-/// As [`configured`].
-pub(super) fn prepared<T>(
+/// The errors of [`in_configuration_state`].
+pub(super) fn in_required_state<T>(
     master: &mut Master<'_>,
     device: &LssDevice,
     method: &AssignEntry,
@@ -121,12 +121,12 @@ pub(super) fn prepared<T>(
     mut work: impl FnMut(&mut Lss<'_, '_>) -> Result<T, Failure>,
 ) -> Result<Session<T>, Failure> {
     let previous = enter_state(master, device, method.state)?;
-    let first = configured(master, device, &mut work);
+    let first = in_configuration_state(master, device, &mut work);
     let is_silent = first.as_ref().is_err_and(|failure| is_silent(device, failure));
     let (done, previous_state) = if is_silent && method.retry_stopped && device.is_alone {
         notify(device.note(LssEvent::RetryInStopped));
         let stopped = enter_state(master, device, Some(AssignState::Stopped))?;
-        (configured(master, device, work), previous.or(stopped))
+        (in_configuration_state(master, device, work), previous.or(stopped))
     } else {
         (first, previous)
     };

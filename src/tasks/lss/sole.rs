@@ -6,7 +6,7 @@ use super::event::{AnotherSlave, LssEvent, UnansweredService};
 use super::failure::LssCause;
 use super::node_id::{AnsweringDevices, answering_devices};
 use super::nodes;
-use super::session::configured;
+use super::session::in_configuration_state;
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::{LssAddress, Part};
 use crate::master::lss::{Gathered, Others};
@@ -21,7 +21,7 @@ struct SlaveAnswers {
     node: Option<Option<NodeId>>,
     /// The evidence of more than one slave.
     another: Option<AnotherSlave>,
-    /// Whether the slave does not answer the identification of others (46h to 4Bh).
+    /// Whether the slave does not answer the identify service (46h to 4Bh), so other slaves are not excluded.
     is_unproven: bool,
 }
 
@@ -39,7 +39,8 @@ pub(super) fn only_device(
     refuse(&device, another.as_ref(), force)?;
     let by_sdo = device.address;
     let answers =
-        configured(master, &device, |lss| ask_all(lss, by_sdo).map_err(|error| device.lss_failure(error)))?.result;
+        in_configuration_state(master, &device, |lss| ask_all(lss, by_sdo).map_err(|error| device.lss_failure(error)))?
+            .result;
     another = another.or(answers.another);
     if let (Some(by_sdo), Some(by_lss)) = (by_sdo, answers.address)
         && by_sdo != by_lss
@@ -71,9 +72,9 @@ pub(super) fn only_device(
     Ok(device)
 }
 
-/// The only device found by SDO, and evidence of another device.
+/// Returns the only device found by SDO, and evidence of another device.
 fn by_sdo(master: &mut Master<'_>) -> Result<(LssDevice, Option<AnotherSlave>), Failure> {
-    let nodes = nodes::on_bus(master)?;
+    let nodes = nodes::find_ids(master)?;
     let (node, mut another) = match nodes[..] {
         [] => (None, None),
         [node] => (Some(node), None),

@@ -108,13 +108,13 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// The message in a frame.
+    /// Creates the message of a frame.
     pub(super) fn of_frame(received: &Received, node: Option<NodeId>, kind: FrameKind, content: Content) -> Entry {
         let (id, data) = (Some(received.frame.id()), received.frame.data().to_vec());
         Entry { at: received.at, node, kind, id, data, is_repeated: false, content }
     }
 
-    /// An event that is not a frame.
+    /// Creates the message of an event that is not a frame.
     pub(super) fn of_bus(at: Stamp, content: Content) -> Entry {
         Entry { at, node: None, kind: FrameKind::Error, id: None, data: Vec::new(), is_repeated: false, content }
     }
@@ -147,7 +147,7 @@ pub enum Content {
     Time(Value),
     /// A TPDO, with its values.
     Tpdo(TpdoNumber, Vec<(Source, Sample)>),
-    /// A TPDO with another length than its mapping, in bytes.
+    /// A TPDO whose length differs from its mapping. The number is the mapped length in bytes.
     WrongLength(TpdoNumber, usize),
     /// A PDO with an unknown mapping: its number by the predefined COB-ID, and whether nodes receive it (RPDO).
     Pdo(u8, bool),
@@ -159,7 +159,7 @@ pub enum Content {
     Dropped(u32),
     /// The interface went up (`true`) or down.
     Link(bool),
-    /// A frame that is none of these. The number is the requested length of a remote frame.
+    /// Any other frame. The number is the requested length of a remote frame.
     Raw(Option<u8>),
 }
 

@@ -1,4 +1,4 @@
-//! From frames to messages.
+//! Converts frames to messages.
 
 use super::entry::{Content, Entry, FrameKind, LssMessage, SdoMessage};
 use crate::bus::{Fault, Mono, Received, Stamp};
@@ -44,9 +44,9 @@ pub struct Interpreter {
     states: BTreeMap<NodeId, NmtState>,
     guarding: BTreeMap<NodeId, Guarding>,
     /// The last LSS request.
-    asked: Option<lss::Service>,
+    lss_request: Option<lss::Service>,
     last_fault: Option<Fault>,
-    /// Nodes whose SDO channel two masters use.
+    /// Nodes whose SDO channel is used by two masters.
     disturbed: BTreeSet<NodeId>,
     samples: Vec<Sample>,
 }
@@ -61,7 +61,7 @@ struct Guarding {
 }
 
 impl Interpreter {
-    /// An interpreter that uses the descriptions of the user and those of recognised devices.
+    /// Creates an interpreter that uses the descriptions of the user and of recognised devices.
     pub fn new(overrides: &Overrides, recognised: Overrides) -> Interpreter {
         let all: Vec<NodeId> = NodeId::all().collect();
         let mut interpreter = Interpreter {
@@ -75,7 +75,7 @@ impl Interpreter {
             emergencies: all.iter().map(|&node| (CanId::emergency(node), node)).collect(),
             states: BTreeMap::new(),
             guarding: BTreeMap::new(),
-            asked: None,
+            lss_request: None,
             last_fault: None,
             disturbed: BTreeSet::new(),
             samples: Vec::new(),
@@ -87,29 +87,29 @@ impl Interpreter {
         interpreter
     }
 
-    /// COB-IDs of TPDOs whose mapping is unknown, and their nodes.
+    /// Returns the COB-IDs of TPDOs whose mapping is unknown, and their nodes.
     pub fn not_decoded(&self) -> BTreeMap<CanId, NodeId> {
         self.setup.not_understood.clone()
     }
 
-    /// When the next SDO transfer without an answer ends.
+    /// Returns when the next SDO transfer without an answer ends.
     pub fn next_deadline(&self) -> Option<Mono> {
         self.transfers.next_deadline()
     }
 
-    /// The SDO transfers that end because no answer came.
+    /// Adds the SDO transfers that end because no answer was received.
     pub fn expire(&mut self, now: Mono, entries: &mut Vec<Entry>) {
         self.transfers.expire(now);
         self.push_transfers(entries);
     }
 
-    /// The SDO transfers that are not complete at the end.
+    /// Adds the SDO transfers that are not complete at the end.
     pub fn finish(&mut self, entries: &mut Vec<Entry>) {
         self.transfers.end_all();
         self.push_transfers(entries);
     }
 
-    /// A fault that the controller reports.
+    /// Adds a fault that the controller reports.
     pub fn fault(&mut self, fault: Fault, at: Stamp, entries: &mut Vec<Entry>) {
         let is_repeated = self.last_fault.replace(fault) == Some(fault);
         entries.push(Entry { is_repeated, ..Entry::of_bus(at, Content::Fault(fault)) });
@@ -202,7 +202,7 @@ impl Interpreter {
         }
     }
 
-    /// Heartbeats, boot-up messages and node guarding.
+    /// Interprets heartbeats, boot-up messages and node guarding.
     fn life(&mut self, frame: &Frame) -> Option<(Option<NodeId>, FrameKind, Content)> {
         if let (Some(node), true) = (frame.id().heartbeat_node(), frame.is_remote()) {
             return Some((Some(node), FrameKind::Guarding, Content::GuardingRequest));
@@ -254,11 +254,11 @@ impl Interpreter {
 
     fn lss(&mut self, frame: &Frame) -> Option<(Option<NodeId>, FrameKind, Content)> {
         let message = if let Some(request) = lss::Request::parse(frame) {
-            self.asked = Some(request.service());
+            self.lss_request = Some(request.service());
             Some(LssMessage::Request(request))
         } else {
             let answer = |service| Some(LssMessage::Answer(service, lss::Answer::parse(frame, service)?.ok()?));
-            self.asked.and_then(answer)
+            self.lss_request.and_then(answer)
         };
         let is_lss = matches!(frame.id(), CanId::LSS_MASTER | CanId::LSS_SLAVE);
         is_lss.then(|| (None, FrameKind::Lss, message.map_or(raw(frame), Content::Lss)))
@@ -282,7 +282,7 @@ impl Interpreter {
     }
 }
 
-/// A frame without a known content.
+/// Returns the content of a frame that cannot be interpreted.
 fn raw(frame: &Frame) -> Content {
     Content::Raw(frame.is_remote().then(|| frame.len()))
 }
@@ -296,7 +296,7 @@ fn nmt(frame: &Frame) -> Option<(Option<NodeId>, FrameKind, Content)> {
     Some((parsed.and_then(|(_, node)| node), FrameKind::Nmt, content))
 }
 
-/// PDOs by the COB-IDs of the predefined connection set (CiA 301, 7.3.3).
+/// Recognises PDOs by the COB-IDs of the predefined connection set (CiA 301, 7.3.3).
 fn predefined_pdo(frame: &Frame) -> Option<(Option<NodeId>, FrameKind, Content)> {
     let CanId::Standard(id) = frame.id() else { return None };
     let node = NodeId::new((id & 0x7f) as u8).ok()?;
@@ -315,7 +315,7 @@ fn predefined_pdo(frame: &Frame) -> Option<(Option<NodeId>, FrameKind, Content)>
     Some((Some(node), FrameKind::Pdo, content))
 }
 
-/// A transfer with the name, type and value of its object.
+/// Adds the name, type and value of the object to a transfer.
 fn sdo_message(node: &Node, transfer: Transfer) -> SdoMessage {
     let object = transfer.object;
     let data_type = node.known_type(object);
@@ -346,7 +346,7 @@ fn sdo_message(node: &Node, transfer: Transfer) -> SdoMessage {
     message
 }
 
-/// The value in the bytes of a transfer, as `sdo read` shows it.
+/// Returns the value in the bytes of a transfer, as `sdo read` shows it.
 fn value(data_type: Option<DataType>, uploaded: &Uploaded) -> (Value, Option<Result<Note, FitError>>) {
     match fit(data_type, uploaded) {
         Ok(fitted) => (fitted.value, fitted.note.map(Ok)),
@@ -354,13 +354,13 @@ fn value(data_type: Option<DataType>, uploaded: &Uploaded) -> (Value, Option<Res
     }
 }
 
-/// The fixed unit of the number in an object.
+/// Returns the fixed unit of the number in an object.
 fn unit(node: &Node, object: ObjectId) -> Option<String> {
     let described = node.described(object).and_then(|entry| entry.unit.clone());
     described.or_else(|| standard::unit(object).map(str::to_owned))
 }
 
-/// The meaning of a number in an object.
+/// Returns the meaning of a number in an object.
 fn meaning(node: &Node, object: ObjectId, number: u64) -> Option<String> {
     let described = || node.described(object)?.meaning(number).map(str::to_owned);
     let of_status = node.signals.iter().find(|signal| signal.status == Some(object));
@@ -371,7 +371,7 @@ fn meaning(node: &Node, object: ObjectId, number: u64) -> Option<String> {
     described().or_else(|| unit.map(|code| Unit(code).to_string())).filter(|text| !text.is_empty())
 }
 
-/// The measured value in an object, with decimal digits and unit.
+/// Returns the measured value in an object, with decimal digits and unit.
 fn sample(node: &Node, object: ObjectId, bytes: &[u8], at: Stamp) -> Option<(Source, Sample)> {
     let layout = node.layout();
     let signal = layout.value_signal(object).or_else(|| layout.measured_signal(object))?;

@@ -14,7 +14,7 @@ pub enum NmtFailure {
         /// The state that was requested.
         wanted: NmtState,
     },
-    /// The node sent and answered nothing after the command.
+    /// After the command, the node sent nothing and did not answer.
     NoSign,
     /// No boot-up message came after a reset.
     NoBootUp,
