@@ -68,7 +68,7 @@ pub struct Rule {
 }
 
 impl Rule {
-    /// The rule that these bytes violate, if the description of the node has one.
+    /// Returns the rule of the description that these bytes violate, if any.
     pub fn broken(node: &Node, object: ObjectId, data: &[u8]) -> Option<Rule> {
         let entry = node.described(object)?;
         let is_number = matches!(entry.data_type, DataType::Unsigned(_) | DataType::Integer(_) | DataType::Real32);
@@ -161,29 +161,29 @@ impl Fact {
 }
 
 impl Note {
-    /// Warnings that signals of a node may be clipped.
+    /// Creates warnings that signals of a node may be clipped.
     pub fn may_clip(node: NodeId, values: Vec<NarrowValue>) -> impl Iterator<Item = Note> {
         values.into_iter().map(move |value| Note { node: Some(node), fact: Fact::MayClip(value) })
     }
 
-    /// A warning that a node accepted a number that its description does not allow.
+    /// Creates a warning if a node accepted a number that its description does not allow.
     pub fn out_of_range(node: &Node, object: ObjectId, data: &[u8]) -> Option<Note> {
         let rule = Rule::broken(node, object, data).filter(|rule| rule.is_out_of_range)?;
         Some(Note::of_node(node.id, Fact::Rule(Box::new(rule))))
     }
 
-    /// A note about one node.
+    /// Creates a note about one node.
     pub fn of_node(node: NodeId, fact: impl Into<Fact>) -> Note {
         Note { node: Some(node), fact: fact.into() }
     }
 
-    /// A note that does not belong to a single node.
+    /// Creates a note that does not belong to a single node.
     pub fn general(fact: impl Into<Fact>) -> Note {
         Note { node: None, fact: fact.into() }
     }
 }
 
-/// The effect and the fact of an area as an [`Effect`] and a [`Fact`].
+/// Converts the effect and the fact of an area to an [`Effect`] and a [`Fact`].
 macro_rules! areas {
     ($($area:ident($effect:ty, $fact:ty);)+) => {
         $(impl From<$effect> for Effect {

@@ -35,12 +35,12 @@ pub struct Target {
     /// The bits of the error register (1001h) that mean an overload, if the signal has no status object. The register
     /// is also read.
     pub overload_register: Option<u8>,
-    /// How the bytes become a sample.
+    /// How the bytes are converted to a sample.
     pub reading: Reading,
 }
 
 impl Target {
-    /// The object that is read in addition to the value: the status, or the error register.
+    /// Returns the object that is read in addition to the value: the status, or the error register.
     pub fn second_object(&self) -> Option<ObjectId> {
         self.status.or(self.overload_register.map(|_| Node::ERROR_REGISTER))
     }
@@ -52,7 +52,8 @@ impl Target {
         value.ok().and_then(|(bits, _)| bits.as_u64()).is_some_and(|bits| bits & u64::from(mask) == u64::from(mask))
     }
 
-    /// The unit of this target, and the unit to convert to: `C` and `F` are degrees if the target is a temperature.
+    /// Returns the unit of this target and the unit to convert to. If the target is a temperature, `C` and `F` are
+    /// degrees.
     ///
     /// # Errors
     /// The units do not convert.
@@ -64,7 +65,7 @@ impl Target {
         })
     }
 
-    /// A value in another unit, with this unit.
+    /// Converts a value to another unit. Returns the value and this unit.
     ///
     /// # Errors
     /// The units do not convert.
@@ -74,7 +75,7 @@ impl Target {
     }
 }
 
-/// The requested targets of a node, or all its signals.
+/// Returns the requested targets of a node, or the targets of all its signals.
 ///
 /// # Errors
 /// The device does not have a signal or status.
@@ -97,38 +98,38 @@ pub fn targets(node: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec
                     let signal = find(node, name)?;
                     let (object, data_type) = signal.value_object;
                     let reading = Reading::of_signal(signal, data_type, next_number());
-                    measured(node, signal, typed(node, object, name, reading))
+                    with_signal(node, signal, bare_target(node, object, name, reading))
                 }
                 Wanted::Status(name) => {
                     let no_status = || Failure::at(node.id, ReadFailure::NoStatus { signal: name.clone() });
                     let object = find(node, name)?.status.ok_or_else(no_status)?;
-                    plain(node, object, &format!("{name}.status"), next_number())
+                    object_target(node, object, &format!("{name}.status"), next_number())
                 }
                 Wanted::Object(object, Some(stated)) => {
-                    typed(node, *object, &item.name(), Reading::plain(Some(*stated), next_number()))
+                    bare_target(node, *object, &item.name(), Reading::plain(Some(*stated), next_number()))
                 }
                 Wanted::Object(object, None) | Wanted::Named(_, object) => {
-                    plain(node, *object, &item.name(), next_number())
+                    object_target(node, *object, &item.name(), next_number())
                 }
             })
         })
         .collect()
 }
 
-/// The target for an object.
-fn plain(node: &Node, object: ObjectId, name: &str, number: usize) -> Target {
+/// Creates the target for an object.
+fn object_target(node: &Node, object: ObjectId, name: &str, number: usize) -> Target {
     let layout = node.layout();
     let reading = Reading::of_object(layout, object, layout.data_type(object), number);
-    let target = typed(node, object, name, reading);
+    let target = bare_target(node, object, name, reading);
     if let Some(signal) = layout.measured_signal(object) {
-        return measured(node, signal, target);
+        return with_signal(node, signal, target);
     }
     let unit = layout.unit_of(object);
     Target { source: source(node.id, name, unit), unit, ..target }
 }
 
-/// The target for the process value of a signal, with unit and status.
-fn measured(node: &Node, signal: &Signal, target: Target) -> Target {
+/// Adds unit and status of a signal to the target for its process value.
+fn with_signal(node: &Node, signal: &Signal, target: Target) -> Target {
     Target {
         source: source(node.id, &target.source.signal, signal.unit),
         unit: signal.unit,
@@ -139,15 +140,14 @@ fn measured(node: &Node, signal: &Signal, target: Target) -> Target {
     }
 }
 
-fn typed(node: &Node, object: ObjectId, name: &str, reading: Reading) -> Target {
+fn bare_target(node: &Node, object: ObjectId, name: &str, reading: Reading) -> Target {
     let (status, status_type, overload_register) = (None, U8, None);
     Target { source: source(node.id, name, None), unit: None, object, status, status_type, overload_register, reading }
 }
 
 const U8: DataType = DataType::Unsigned(1);
 
-/// The type of a status object: UNSIGNED8 as 6150h, unless a description or an EDS states another
-/// type.
+/// Returns the type of a status object: UNSIGNED8 (as 6150h), unless a description or an EDS states another type.
 fn status_type(node: &Node, status: Option<ObjectId>) -> DataType {
     let stated = status.and_then(|object| node.layout().data_type(object));
     stated.filter(|data_type| matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_))).unwrap_or(U8)
@@ -160,7 +160,7 @@ pub(super) fn find<'a>(node: &'a Node, name: &str) -> Result<&'a Signal, Failure
     })
 }
 
-/// The sample of a target from the answers to its [`objects`].
+/// Converts the answers to the [`objects`] of a target to a sample.
 ///
 /// # Errors
 /// The value could not be read. If the device rejects the status object, it has no status; without a valid answer, the
@@ -179,7 +179,7 @@ pub fn sample(
         failure: SdoFailure::NotANumber,
     };
     let Some(data_type) = target.reading.data_type().filter(|data_type| data_type.is_number()) else {
-        // Bytes without a known type stay bytes. A sample has no place for a long text.
+        // Bytes without a known type stay bytes. A sample cannot contain a long text.
         let bytes = answer.uploaded.as_ref().map(|uploaded| uploaded.bytes.as_slice()).unwrap_or_default();
         let is_text = target.reading.data_type().is_some();
         let bytes = if is_text && bytes.len() > 8 { &[] } else { bytes };
@@ -212,14 +212,14 @@ pub fn sample(
         target.reading.report_overload(&mut sample, None);
     }
     if is_unknown {
-        // A marker in the value shows only an overload.
+        // Without the status, a marker in the value can only show an overload.
         sample.status = sample.status.filter(|&status| status != Status::Ok);
         sample.doubt = sample.doubt.or(Some(Doubt::UnknownStatus));
     }
     Ok(sample)
 }
 
-/// The bytes of a value in the width of its type. The answer may have more or fewer bytes.
+/// Encodes a value in the width of its type. The answer may have more or fewer bytes.
 fn wire_bytes(value: &Value, data_type: DataType) -> Vec<u8> {
     let width = data_type.width().unwrap_or(8).min(8);
     match value {
@@ -232,7 +232,7 @@ fn wire_bytes(value: &Value, data_type: DataType) -> Vec<u8> {
     }
 }
 
-/// The objects of a target: value, and status or error register.
+/// Returns the objects of a target: value, and status or error register.
 pub fn objects(target: &Target) -> impl Iterator<Item = (NodeId, ObjectId)> + use<> {
     let node = target.source.node;
     [Some(target.object), target.second_object()].into_iter().flatten().map(move |object| (node, object))
@@ -259,7 +259,7 @@ pub fn read(
     Ok(planned.into_iter().map(|targets| readings(targets?, &mut answers)).collect())
 }
 
-/// The samples of one node from the answers to its [`objects`]. Uses up all answers of the node, even after an error,
+/// Converts the answers to the [`objects`] of one node to samples. Takes all answers of the node, even after an error,
 /// because the answers of the next node follow.
 fn readings(
     targets: Vec<Target>,

@@ -32,9 +32,9 @@ pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool
         return Ok(report);
     }
     let read = |master: &mut Master<'_>| snapshot::take(master, device, &objects);
-    let (after, of_state) = snapshot::reset(master, node, state, read)
+    let (after, state_notes) = snapshot::reset(master, node, state, read)
         .map_err(|failure| failure.with(node, StoreEffect::NotVerified(StoreCommand::Restore)))?;
-    report.notes.extend(of_state);
+    report.notes.extend(state_notes);
     let Comparison { equal, unchanged } = compare(device, &before, &after)?;
     if !unchanged.is_empty() {
         report.notes.push(note(StoreFact::Unchanged(unchanged)));
@@ -50,12 +50,12 @@ pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool
 struct Comparison {
     /// The number of settings that have their default.
     equal: usize,
-    /// Settings that kept their value, although it is not their usual default. The default is not in the manual, or
-    /// differs between devices.
+    /// Settings that kept a value other than the default in the description. This default is uncertain: it is not in
+    /// the manual, or differs between devices.
     unchanged: Vec<Snapshot>,
 }
 
-/// Checks that all settings with a known default have it.
+/// Checks that all settings with a known default have this default.
 fn compare(device: &Node, before: &[Snapshot], after: &[Snapshot]) -> Result<Comparison, Failure> {
     let (mut equal, mut wrong, mut unchanged) = (0, Vec::new(), Vec::new());
     for setting in after {

@@ -35,10 +35,10 @@ impl Found {
     }
 }
 
-/// Reads the device type of every node in parallel, then the identity of those that answer.
+/// Reads the device type of every node in parallel, then the identity of the nodes that answer.
 ///
 /// Heartbeats and boot-up messages also show nodes, for example stopped nodes that cannot answer. Nodes without an
-/// answer are asked `rounds` times in total; `timeout` is the wait after the last first request.
+/// answer are asked `rounds` times in total; `timeout` is the waiting time after the first request to the last node.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C. If there is no node, the list is empty.
@@ -49,7 +49,7 @@ pub fn scan(
     rounds: u32,
     overrides: &Overrides,
 ) -> Result<Vec<Found>, Error> {
-    // The only node may answer with another COB-ID.
+    // If only one node is scanned, it may answer with another COB-ID.
     if nodes.len() == 1 {
         master.listen(&Filters::All)?
     } else {
@@ -58,7 +58,7 @@ pub fn scan(
     let presence = scan::find(master, nodes, timeout, rounds)?;
     let answering: Vec<NodeId> = nodes.iter().copied().filter(|node| presence.answered.contains(node)).collect();
     master.listen_to(nodes)?;
-    let mut found = found(&presence, nodes);
+    let mut found = found_nodes(&presence, nodes);
     if let (Some(error), []) = (&presence.other_channel, &found[..]) {
         found.push(Found { failure: Some(error.clone().into()), ..Found::new(error.node, None) });
     }
@@ -93,7 +93,7 @@ pub fn listen(
     overrides: &Overrides,
 ) -> Result<Vec<Found>, Error> {
     let presence = scan::listen(master, duration)?;
-    let mut found = found(&presence, nodes);
+    let mut found = found_nodes(&presence, nodes);
     for entry in &mut found {
         let identity = presence.overheard.identity(entry.node);
         let named = overrides.get(&entry.node).filter(|model| identity.fits(model)).cloned();
@@ -103,8 +103,8 @@ pub fn listen(
     Ok(found)
 }
 
-/// The requested nodes that were detected, in ascending order.
-fn found(presence: &Presence, nodes: &[NodeId]) -> Vec<Found> {
+/// Returns the requested nodes that were detected, in ascending order.
+fn found_nodes(presence: &Presence, nodes: &[NodeId]) -> Vec<Found> {
     let of_node = |node| Found::new(node, presence.state(node));
     presence.nodes().into_iter().filter(|node| nodes.contains(node)).map(of_node).collect()
 }

@@ -10,7 +10,7 @@ use crate::node::write::write_with;
 use crate::node::{self, Node, Overrides, WriteOptions, Written, names, survey};
 use crate::tasks::{self, Failure};
 
-/// The longest object that is read into a file.
+/// The maximum length (in bytes) of an object that is read into a file.
 pub const FILE_LIMIT: usize = LONGEST;
 
 /// A value of an object.
@@ -36,15 +36,16 @@ pub struct ReadValue {
 pub struct ReadOptions<'a> {
     /// When block transfer is used.
     pub blocks: BlockMode,
-    /// An object of unknown length has at most this many bytes.
+    /// The maximum number of bytes of an object of unknown length.
     pub longest: usize,
-    /// Whether a length other than the announced one is always a failure. For content that is saved to a file.
+    /// Whether a length that differs from the announced length is always a failure. For content that is saved to a
+    /// file.
     pub is_exact: bool,
     /// Called every 100 ms with the bytes transferred.
     pub progress: &'a mut dyn FnMut(Moved),
 }
 
-/// Reads an object. The type is `data_type`, else that of the description or the standard.
+/// Reads an object. The type is `data_type`, else the type in the description or the standard.
 ///
 /// # Errors
 /// A failed transfer, bytes that do not fit the type, bus errors and Ctrl-C.
@@ -71,8 +72,8 @@ pub fn read(
     Ok(ReadValue { node: node.id, object, name: entry.map(|entry| entry.full_name()), data_type, value, raw, note })
 }
 
-/// The bytes of a value for an object, and their type: `data_type`, else that of the description or the standard, else
-/// an integer as wide as the object.
+/// Encodes a value for an object, and returns the bytes and their type. The type is `data_type`, else the type in the
+/// description or the standard, else an integer as wide as the object.
 ///
 /// # Errors
 /// A value that does not fit the type, an unknown type, a failed transfer, bus errors and Ctrl-C.
@@ -110,7 +111,7 @@ pub fn find_form(master: &mut Master<'_>, node: &mut Node) -> Result<(), Failure
     }
 }
 
-/// Warnings that signals may be clipped, after a write of unit, decimal digits, or the mapping of a TPDO.
+/// Returns warnings that signals may be clipped, after a write of unit, decimal digits, or the mapping of a TPDO.
 pub fn clipping(master: &mut Master<'_>, node: &Node, written: ObjectId) -> Vec<tasks::Note> {
     if !matches!(written.index, 0x1a00..=0x1bff | 0x6131 | 0x6132) {
         return Vec::new();
@@ -124,7 +125,7 @@ pub fn clipping(master: &mut Master<'_>, node: &Node, written: ObjectId) -> Vec<
 /// Writes bytes to an object, reads them back if `verify` is `true`, and compares. Returns how the write was confirmed.
 ///
 /// # Errors
-/// As [`write_with`]; the object has a different value.
+/// The errors of [`write_with`]; the object has a different value.
 pub fn write(
     master: &mut Master<'_>,
     node: &Node,

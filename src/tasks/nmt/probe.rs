@@ -14,7 +14,7 @@ use std::time::Duration;
 /// The heartbeat time during the probe.
 const PROBE_PERIOD: Duration = Duration::from_millis(100);
 
-/// How often 1017h is restored again after Ctrl-C, or if the node has another value.
+/// The number of further attempts to restore 1017h after Ctrl-C, or if the node has another value.
 const MAX_ATTEMPTS: u32 = 5;
 
 /// The result of a probe.
@@ -28,12 +28,12 @@ pub struct Probe {
     pub left: Option<LeftHeartbeat>,
 }
 
-/// The heartbeat time of the probe, which was not restored.
+/// A heartbeat time that was not restored after a probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeftHeartbeat {
     /// The heartbeat time in milliseconds.
     pub milliseconds: u16,
-    /// The time before the probe in milliseconds.
+    /// The heartbeat time before the probe in milliseconds.
     pub before: u16,
     /// Whether the node acknowledged the time; otherwise 1017h may have either value.
     pub is_certain: bool,
@@ -51,8 +51,8 @@ pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) ->
         Some(Ok(value)) => value.as_u64().and_then(|time| u16::try_from(time).ok()).unwrap_or(0),
         None => 0,
     };
-    let probed = u16::try_from(PROBE_PERIOD.as_millis()).unwrap_or(u16::MAX);
-    let temporary = TemporaryWrite::to(node, HEARTBEAT_TIME, &before.to_le_bytes(), &probed.to_le_bytes());
+    let probe_time = u16::try_from(PROBE_PERIOD.as_millis()).unwrap_or(u16::MAX);
+    let temporary = TemporaryWrite::to(node, HEARTBEAT_TIME, &before.to_le_bytes(), &probe_time.to_le_bytes());
     if let Err(error) = journal.record(&temporary) {
         return Ok(failed(Failure::at(node.id, NmtFailure::NotRecorded(error))));
     }
@@ -78,10 +78,10 @@ pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) ->
         _ => None,
     };
     let is_certain = milliseconds.is_some() || set.is_ok() && !is_acknowledged;
-    let left = LeftHeartbeat { milliseconds: milliseconds.unwrap_or(probed), before, is_certain };
-    let failure = split(set)?;
+    let left = LeftHeartbeat { milliseconds: milliseconds.unwrap_or(probe_time), before, is_certain };
+    let failure = node_failure(set)?;
     waited?;
-    let (failure, left) = match split(restored)? {
+    let (failure, left) = match node_failure(restored)? {
         None => (failure, None),
         Some(error) => (Some(error), Some(left)),
     };
@@ -108,8 +108,8 @@ fn restore(master: &mut Master<'_>, node: &Node, before: u16) -> (Result<(), Err
     (result, is_acknowledged)
 }
 
-/// The failure of the node itself; bus errors and Ctrl-C are errors.
-fn split<T>(result: Result<T, Error>) -> Result<Option<Failure>, MasterError> {
+/// Returns the failure of the node itself. Bus errors and Ctrl-C are returned as errors.
+fn node_failure<T>(result: Result<T, Error>) -> Result<Option<Failure>, MasterError> {
     match result {
         Ok(_) => Ok(None),
         Err(Error::Bus(error)) => Err(MasterError::Bus(error)),

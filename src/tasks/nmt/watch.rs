@@ -62,14 +62,14 @@ pub fn watch(
 
 struct Watcher<'a> {
     heartbeats: BTreeMap<NodeId, Heartbeat>,
-    /// The reads of 1017h that are in progress. Frames are already watched.
+    /// The reads of 1017h that are in progress. Meanwhile, heartbeats are already evaluated.
     reads: BTreeMap<Ticket, NodeId>,
     end: Mono,
     on_change: &'a mut dyn FnMut(&StateEvent) -> ControlFlow<()>,
 }
 
 impl Watcher<'_> {
-    /// The end, or the moment at which the next node is lost.
+    /// Returns the end, or the earlier moment at which the next node is lost.
     fn deadline(&self) -> Mono {
         self.heartbeats.values().filter_map(Heartbeat::lost_at).min().map_or(self.end, |at| at.min(self.end))
     }
@@ -84,8 +84,8 @@ impl Watcher<'_> {
         }
     }
 
-    /// The node whose heartbeat is overdue.
-    fn lost(&mut self, at: Stamp) -> Option<StateEvent> {
+    /// Marks a node with an overdue heartbeat as lost, and returns the event.
+    fn mark_lost(&mut self, at: Stamp) -> Option<StateEvent> {
         let now = self.deadline();
         let is_overdue = |heartbeat: &Heartbeat| heartbeat.lost_at().is_some_and(|due| due <= now);
         let (&node, heartbeat) = self.heartbeats.iter_mut().find(|(_, heartbeat)| is_overdue(heartbeat))?;
@@ -104,7 +104,7 @@ impl Waiter for Watcher<'_> {
     }
 
     fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Error> {
-        let seen = match event {
+        let state_event = match event {
             Happening::Frame(received) => Life::parse(&received.frame).and_then(|(node, life)| {
                 let change = self.heartbeats.get_mut(&node)?.on_life(life, received.at.mono)?;
                 Some(StateEvent { at: received.at, node, change })
@@ -114,11 +114,11 @@ impl Waiter for Watcher<'_> {
                 None
             }
             Happening::Deadline if self.deadline() >= self.end => return Ok(ControlFlow::Break(())),
-            Happening::Deadline => self.lost(master.bus().now()),
+            Happening::Deadline => self.mark_lost(master.bus().now()),
             Happening::Interrupted | Happening::Ended => return Ok(ControlFlow::Break(())),
             _ => None,
         };
-        Ok(seen.map_or(ControlFlow::Continue(()), |seen| (self.on_change)(&seen)))
+        Ok(state_event.map_or(ControlFlow::Continue(()), |state_event| (self.on_change)(&state_event)))
     }
 }
 
@@ -133,7 +133,7 @@ struct Heartbeat {
 }
 
 impl Heartbeat {
-    /// The moment at which the node counts as lost if no heartbeat comes.
+    /// Returns the moment at which the node counts as lost if no heartbeat arrives.
     fn lost_at(&self) -> Option<Mono> {
         match (self.last, self.period, self.is_lost) {
             (Some(last), Some(period), false) => Some(last + period * 2 + LATE_TOLERANCE),

@@ -17,8 +17,7 @@ use std::time::Duration;
 /// The longest wait for a device that restarts.
 const BOOT_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// The number of Ctrl-C that are ignored while the old settings are restored. Each one interrupts one SDO
-/// transfer.
+/// The number of Ctrl-C that are ignored while the old settings are restored. Each Ctrl-C interrupts one SDO transfer.
 const MAX_INTERRUPTS: u32 = 5;
 
 /// A change in progress.
@@ -85,7 +84,7 @@ impl Change<'_, '_> {
             self.state.enter(&mut self.session)?;
         }
         let mut writes = self.writes(&old, &wanted);
-        let off = writes.first().filter(|write| **write == self.off()).cloned();
+        let off = writes.first().filter(|write| **write == self.off_write()).cloned();
         if let Some(off) = off {
             writes.remove(0);
             if old.mapping == wanted.mapping {
@@ -124,13 +123,13 @@ impl Change<'_, '_> {
         self.recorded.take().iter().for_each(|write| self.journal.remove(write));
     }
 
-    /// The write that switches the PDO off.
-    fn off(&self) -> StepWrite {
+    /// Returns the write that switches the PDO off.
+    fn off_write(&self) -> StepWrite {
         StepWrite::new(self.old.number.communication(1), self.old.cob_id.switched_off().0, 4)
     }
 
     /// Whether the change can continue although the device rejected bit 31. Some devices do not support bit 31 and
-    /// accept a new mapping without it. Not allowed if the description contains bit 31.
+    /// accept a new mapping without it. This is not allowed if the description requires bit 31.
     fn may_stay_on(&self, error: &SdoError) -> bool {
         let is_unknown_bit = matches!(
             error.failure,
@@ -145,7 +144,7 @@ impl Change<'_, '_> {
         self.current = Some(write.clone());
         match self.session.write(write) {
             Err(StepError::Rejected(SdoError { failure: SdoFailure::Refused(AbortCode::DEVICE_STATE), .. }))
-                if !self.state.is_switched() && *write != self.off() =>
+                if !self.state.is_switched() && *write != self.off_write() =>
             {
                 self.state.enter(&mut self.session)?;
                 self.session.write(write)?;
@@ -241,7 +240,7 @@ impl Change<'_, '_> {
         Some(StateEffect::NotRestored)
     }
 
-    /// The failure of the change.
+    /// Returns the failure of the change.
     fn failure(&self, error: &StepError) -> Failure {
         let mappable = match error.abort() {
             Some(AbortCode::NOT_MAPPABLE) => self.mappable(),
@@ -257,7 +256,7 @@ impl Change<'_, '_> {
         }
     }
 
-    /// The entries that the device can map, from its description.
+    /// Returns the entries that the device can map, from its description.
     fn mappable(&self) -> Vec<MappingEntry> {
         let model = self.session.node.model.iter();
         let entries = model.flat_map(|model| model.dictionary.iter()).filter(|entry| entry.pdo);
@@ -265,7 +264,7 @@ impl Change<'_, '_> {
         entries.filter_map(|known| entry(known.object, known.data_type.width()?)).collect()
     }
 
-    /// The failure of a change that could not be undone.
+    /// Returns the failure of a change that could not be undone.
     fn incomplete(&self, error: &StepError, last: StepError) -> Failure {
         let is_same_reason = matches!((error, &last), (StepError::Lost(_), StepError::Lost(_)));
         let incomplete = Incomplete {
@@ -278,7 +277,7 @@ impl Change<'_, '_> {
         self.failure(error).with(self.session.node.id, PdoEffect::Incomplete(Box::new(incomplete)))
     }
 
-    /// Adds notes about unexpected consequences: when the TPDO is sent with the new settings.
+    /// Adds notes if the new settings determine when the TPDO is sent in a way that the user may not expect.
     fn note_consequences(&mut self) {
         let Settings { number, event_timer_ms, .. } = self.wanted;
         let transmission = self.wanted.transmission();

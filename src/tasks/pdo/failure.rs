@@ -264,8 +264,8 @@ pub enum PdoEffect {
 pub struct Incomplete {
     /// The last confirmed write; `None` if no write was confirmed.
     pub last: Option<StepWrite>,
-    /// Why the previous settings could not be restored, and the failed write; `None` if the reason is that of the
-    /// change.
+    /// Why the previous settings could not be restored, and the failed write; `None` if the change failed for the same
+    /// reason.
     pub restore: Option<(StepError, Option<StepWrite>)>,
     /// The previous settings.
     pub previous: Settings,
@@ -372,7 +372,7 @@ impl PdoFact {
     }
 }
 
-/// The settings of a TPDO could not be read.
+/// Converts the error of a read of TPDO settings to a failure.
 pub(super) fn not_read(node: NodeId, available: Vec<TpdoNumber>, error: StepError) -> Failure {
     match error {
         StepError::Rejected(error) => {

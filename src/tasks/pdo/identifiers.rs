@@ -19,7 +19,7 @@ use std::time::Duration;
 /// How long to listen for frames with the identifier.
 const LISTEN_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// TIME of the predefined connection set.
+/// The COB-ID of TIME in the predefined connection set.
 const TIME: CanId = CanId::Standard(0x100);
 
 /// The objects that contain an identifier: SYNC, TIME, EMCY, and the first PDOs of both directions (CiA 301).

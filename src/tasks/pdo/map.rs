@@ -70,7 +70,7 @@ pub fn map(
         let mut planned = Node { tpdos: vec![tpdo], ..node.clone() };
         notes.extend(Note::may_clip(node.id, narrow_values(session.master, &mut planned)?));
     }
-    let Changed { writes, wanted, notes: of_change } = change_settings(session, old, wanted, journal)?;
+    let Changed { writes, wanted, notes: change_notes } = change_settings(session, old, wanted, journal)?;
     let note = |fact: PdoFact| Note::of_node(node.id, fact);
     if writes == 0 {
         notes.insert(0, note(PdoFact::AlreadySet { number }));
@@ -81,7 +81,7 @@ pub fn map(
         notes.push(note(PdoFact::Stored { groups: done.groups.clone() }));
         notes.extend(done.notes.iter().cloned());
     }
-    notes.extend(of_change);
+    notes.extend(change_notes);
     if writes > 0 && node.model.as_deref().is_some_and(|model| !is_stored(model, number)) {
         notes.push(note(PdoFact::LostAtPowerOff { number }));
     }
@@ -110,7 +110,7 @@ pub(in crate::tasks) fn read(master: &mut Master<'_>, node: &Node, number: TpdoN
 /// Changes the settings of a TPDO of a known node as a transaction: see [`map()`].
 ///
 /// # Errors
-/// As [`map()`].
+/// The errors of [`map()`].
 pub(in crate::tasks) fn change(
     master: &mut Master<'_>,
     node: &Node,
@@ -120,7 +120,7 @@ pub(in crate::tasks) fn change(
     change_settings(Session::new(master, node), old, wanted, &mut NoJournal)
 }
 
-/// The writes of [`change`], if the device rejects none of them.
+/// Returns the writes of [`change`] for a device that rejects none of them.
 pub(in crate::tasks) fn steps(node: &Node, old: &Settings, wanted: &Settings) -> Vec<StepWrite> {
     let remap = node.model.as_ref().map(|model| model.description.pdo.remap).unwrap_or_default();
     plan::writes(old, wanted, remap, false)
@@ -181,11 +181,11 @@ fn check(session: &mut Session<'_, '_>, old: &Settings, wanted: &Settings) -> Re
         return Err(Failure::at(node.id, PdoFailure::FixedMapping { number, mapping: old.mapping.clone() }));
     }
     let (before, after) = (old.cob_id, wanted.cob_id);
-    let moves = before.can_id() != after.can_id();
-    if after.is_valid() && (moves || !before.is_valid()) {
+    let id_changes = before.can_id() != after.can_id();
+    if after.is_valid() && (id_changes || !before.is_valid()) {
         identifiers::check_own(node, number, after.can_id())?;
     }
-    if after.is_valid() && moves {
+    if after.is_valid() && id_changes {
         identifiers::check_others(session, after.can_id())?;
     }
     Ok(())

@@ -36,7 +36,7 @@ pub enum Item {
 pub enum Trigger {
     /// A transmission type (180xh:2).
     Code(u8),
-    /// The event timer: the transmission type of the device for it.
+    /// The transmission type that the device uses for the event timer.
     Timer,
 }
 
@@ -75,7 +75,7 @@ impl PdoRequest {
         }
     }
 
-    /// The requested mapping (`None` keeps the mapping), and notes about it.
+    /// Returns the requested mapping (`None` keeps the mapping), and notes about it.
     ///
     /// # Errors
     /// Unknown names, objects of unknown width, more than 64 bits.
@@ -88,7 +88,7 @@ impl PdoRequest {
         for item in &self.items {
             let (object, bits) = match item {
                 Item::Object(object, bits) => (*object, *bits),
-                Item::Name(name, bits) => (named(node, name)?, *bits),
+                Item::Name(name, bits) => (object_by_name(node, name)?, *bits),
             };
             let bits = match bits.or_else(|| width(node, object)) {
                 Some(bits) => bits,
@@ -105,7 +105,7 @@ impl PdoRequest {
         Ok((Some(entries).filter(|entries| !entries.is_empty()), notes))
     }
 
-    /// The requested settings. A new mapping or identifier switches the TPDO on.
+    /// Returns the requested settings. A new mapping or identifier switches the TPDO on.
     ///
     /// # Errors
     /// [`PdoFailure::NoParameter`], [`PdoFailure::NoIdentifier`].
@@ -178,8 +178,8 @@ impl FromStr for Item {
     }
 }
 
-/// The object of a signal, of its status, or with a name of the description or the standard.
-fn named(node: &Node, name: &str) -> Result<ObjectId, Failure> {
+/// Finds the object with this name: a signal, the status of a signal, or an object of the description or the standard.
+fn object_by_name(node: &Node, name: &str) -> Result<ObjectId, Failure> {
     if let Some(signal) = node.signal(name) {
         return Ok(value_object(node, signal));
     }
@@ -193,14 +193,15 @@ fn named(node: &Node, name: &str) -> Result<ObjectId, Failure> {
     }
 }
 
-/// The mapping entry for an item of `pdo map` or a file: `pressure`, `pressure.status`, `0x9130:1/32`. Needs no bus.
+/// Parses the mapping entry in an item of `pdo map` or of a file: `pressure`, `pressure.status`, `0x9130:1/32`. Needs
+/// no bus.
 ///
 /// # Errors
 /// Unknown names, wrong numbers of bits, objects of unknown width.
 pub(in crate::tasks) fn entry_of(node: &Node, text: &str) -> Result<MappingEntry, Failure> {
     let (object, bits) = match text.parse() {
         Ok(Item::Object(object, bits)) => (object, bits),
-        Ok(Item::Name(name, bits)) => (named(node, &name)?, bits),
+        Ok(Item::Name(name, bits)) => (object_by_name(node, &name)?, bits),
         Err(_) => return Err(Failure::at(node.id, unknown_name(node, text))),
     };
     match bits.or_else(|| width(node, object)) {
@@ -209,7 +210,7 @@ pub(in crate::tasks) fn entry_of(node: &Node, text: &str) -> Result<MappingEntry
     }
 }
 
-/// The shortest text that [`entry_of`] converts to this entry.
+/// Returns a text that [`entry_of`] converts to this entry, if possible the name of a signal.
 pub(in crate::tasks) fn text_of(node: &Node, entry: MappingEntry) -> String {
     let signals = node.signals.iter().flat_map(|signal| [signal.name.clone(), format!("{}.status", signal.name)]);
     let texts = signals.chain([node.name_of(entry.object), entry.object.to_string()]);
@@ -231,8 +232,8 @@ fn unknown_name(node: &Node, name: &str) -> PdoFailure {
     PdoFailure::UnknownName { name: name.to_owned(), nearest, signals }
 }
 
-/// The object to map for a signal: its process value. If the description does not allow this, another object with the
-/// same value.
+/// Returns the object to map for a signal: its process value. If the description does not allow this, returns another
+/// object with the same value.
 fn value_object(node: &Node, signal: &Signal) -> ObjectId {
     let value = signal.value_object.0;
     let Some(model) = &node.model else { return value };
@@ -245,7 +246,7 @@ fn value_object(node: &Node, signal: &Signal) -> ObjectId {
     }
 }
 
-/// The bits of an object, if its type is known from the description or the standard.
+/// Returns the number of bits of an object, if its type is known from the description or the standard.
 fn width(node: &Node, object: ObjectId) -> Option<u8> {
     let model = node.model.as_ref();
     let described = model.and_then(|model| {
@@ -263,7 +264,7 @@ fn width(node: &Node, object: ObjectId) -> Option<u8> {
     }
 }
 
-/// The bits of an object, from the size that the device indicates when the object is read.
+/// Reads an object, and returns the number of its bits from the size that the device indicates.
 fn read_width(session: &mut Session<'_, '_>, object: ObjectId) -> Result<u8, Failure> {
     let node = session.node.id;
     let answer = session.master.transfer_one(Request::read(node, object))??;

@@ -1,4 +1,4 @@
-//! The exchanges of one change with a node. A boot-up message during the change counts as a restart.
+//! Reads and writes objects of a node during one change. A boot-up message during the change counts as a restart.
 
 use super::failure::{StepError, StepWrite};
 use crate::bus::Received;
@@ -12,7 +12,7 @@ use crate::node::{self, Node, Repeat, WriteOptions};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The exchanges of one change with a node.
+/// The reads and writes of one change.
 pub(super) struct Session<'a, 'bus> {
     pub(super) master: &'a mut Master<'bus>,
     pub(super) node: &'a Node,
@@ -20,7 +20,7 @@ pub(super) struct Session<'a, 'bus> {
     pub(super) has_restarted: bool,
     /// The number of writes that the node carried out.
     pub(super) writes: u32,
-    /// Whether optional objects may be silent. They are then recorded as unknown.
+    /// Whether the device need not answer reads of optional objects. Their values are then unknown.
     pub(super) accepts_silence: bool,
 }
 
@@ -76,7 +76,7 @@ impl<'a, 'bus> Session<'a, 'bus> {
         if self.has_restarted { Err(StepError::Restarted) } else { Ok(()) }
     }
 
-    /// Reads another object after a cancelled exchange, because no older answer can arrive after its answer.
+    /// Reads another object after a cancelled exchange. After its answer, no older answer can arrive.
     pub(super) fn discard_late_answers(&mut self) -> Result<(), StepError> {
         match self.exchange(ObjectId::DEVICE_TYPE)? {
             Ok(_) | Err(SdoError { failure: SdoFailure::Refused(_), .. }) => Ok(()),
@@ -84,7 +84,8 @@ impl<'a, 'bus> Session<'a, 'bus> {
         }
     }
 
-    /// Waits until a node shows that it can answer SDO requests. Returns whether it did.
+    /// Waits for a heartbeat or boot-up message of a node that can answer SDO requests. Returns whether it was
+    /// received.
     pub(super) fn wait_for_life(&mut self, timeout: Duration) -> Result<bool, Error> {
         let (until, own) = (self.master.now() + timeout, self.node.id);
         let life = wait(self.master, until, Policy::Reconnect, |_, event| {

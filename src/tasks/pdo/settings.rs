@@ -41,8 +41,8 @@ impl Settings {
     ) -> Result<Settings, StepError> {
         let cob_id = session.read(number.communication(1), 4)?;
         let transmission = session.read(number.communication(2), 1)?;
-        let inhibit_100us = if inhibit { optional(session, number.communication(3))? } else { None };
-        let event_timer_ms = optional(session, number.communication(5))?;
+        let inhibit_100us = if inhibit { read_optional(session, number.communication(3))? } else { None };
+        let event_timer_ms = read_optional(session, number.communication(5))?;
         let count = u8::try_from(session.read(number.mapping(0), 1)?).unwrap_or(u8::MAX);
         let multiplexed = count > MAX_ENTRIES;
         let entries = if multiplexed { 0 } else { count };
@@ -64,8 +64,8 @@ impl Settings {
         Transmission::from_code(self.transmission)
     }
 
-    /// The first object in which these settings differ from others, with both numbers. Bit 30 of the COB-ID (no remote
-    /// requests) is ignored, because some devices set it themselves.
+    /// Returns the first object in which these settings differ from other settings, with both numbers. Bit 30 of the
+    /// COB-ID (no remote requests) is ignored, because some devices set it themselves.
     pub(super) fn difference(&self, other: &Settings) -> Option<(ObjectId, u64, u64)> {
         let number = self.number;
         let wide = |number: Option<u16>| number.map_or(0, u64::from);
@@ -84,8 +84,8 @@ impl Settings {
     }
 }
 
-/// The number; `None` for an object that the device does not have.
-fn optional(session: &mut Session<'_, '_>, object: ObjectId) -> Result<Option<u16>, StepError> {
+/// Reads a number; `None` if the device does not have the object.
+fn read_optional(session: &mut Session<'_, '_>, object: ObjectId) -> Result<Option<u16>, StepError> {
     match session.read(object, 2) {
         Ok(number) => Ok(u16::try_from(number).ok()),
         Err(StepError::Rejected(SdoError {

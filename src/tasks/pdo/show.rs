@@ -1,4 +1,4 @@
-//! The settings of TPDOs, with their signals.
+//! Shows the settings of TPDOs with their signals.
 
 use super::failure::{PdoFailure, not_read};
 use super::session::Session;
@@ -35,7 +35,7 @@ pub struct TpdoReport {
 }
 
 impl TpdoReport {
-    /// The settings with the signals of the node.
+    /// Adds the signals of the node to the settings.
     pub(super) fn new(node: &Node, settings: Settings) -> TpdoReport {
         let items = settings.mapping.iter().map(|&entry| mapped_item(node, entry)).collect();
         TpdoReport { node: node.id, settings, items }
@@ -59,18 +59,18 @@ fn mapped_item(node: &Node, entry: MappingEntry) -> MappedItem {
     MappedItem { entry, signal: name, unit: layout.unit_of(entry.object) }
 }
 
-/// Whether the TPDO may have an inhibit time (180xh:3). A description with objects is complete.
+/// Whether the TPDO may have an inhibit time (180xh:3). A description with objects lists all objects of the device.
 pub(super) fn may_have_inhibit_time(node: &Node, number: TpdoNumber) -> bool {
     let described = node.model.as_ref().filter(|model| !model.description.objects.is_empty());
     described.is_none_or(|model| model.dictionary.get(number.communication(3)).is_some())
 }
 
-/// The numbers of the node's TPDOs.
+/// Returns the numbers of the node's TPDOs.
 pub(super) fn numbers(node: &Node) -> Vec<TpdoNumber> {
     node.tpdos.iter().map(|tpdo| tpdo.number).collect()
 }
 
-/// The settings of all TPDOs of a node, or of one.
+/// Reads the settings of all TPDOs of a node, or of one TPDO.
 ///
 /// # Errors
 /// No answer; the node does not have the TPDO; bus errors and Ctrl-C.

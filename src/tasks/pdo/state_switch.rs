@@ -15,7 +15,7 @@ pub(super) struct StateSwitch {
 }
 
 impl StateSwitch {
-    /// Sets the node to PRE-OPERATIONAL, unless it is known to be in it.
+    /// Sets the node to PRE-OPERATIONAL, unless it is known to be in this state.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.
@@ -46,7 +46,7 @@ impl StateSwitch {
         self.before == Some(Some(NmtState::Operational))
     }
 
-    /// Sets the node to its previous state, if that is known.
+    /// Sets the node to its previous state, if this state is known.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C. The command was sent in any case.

@@ -196,7 +196,7 @@ impl<'a> Watcher<'a> {
         self.numbers.extend(valid.map(|tpdo| (tpdo.cob_id.can_id(), tpdo.number)));
     }
 
-    /// Reads the mappings from the recording; first from the descriptions that the user named.
+    /// Uses the descriptions that the user named, and from then on the mappings in the recording.
     fn learn(&mut self, mut setup: SetupListener, overrides: &Overrides) {
         setup.apply_overrides(&mut self.decoder);
         overrides.keys().for_each(|&node| self.set_up(&setup.known_node(node)));
@@ -247,8 +247,8 @@ impl<'a> Watcher<'a> {
         }
     }
 
-    /// Handles a TPDO whose length differs from its mapping. After the first longer TPDO, the
-    /// mapping is read again.
+    /// Handles a TPDO whose length differs from its mapping. After the first TPDO that is longer, the mapping is read
+    /// again.
     fn on_wrong_length(
         &mut self,
         node: NodeId,
@@ -277,8 +277,8 @@ impl<'a> Watcher<'a> {
         result: &Result<Answer, SdoError>,
         master: &mut Master<'_>,
     ) -> Result<ControlFlow<()>, Error> {
-        let mut open = self.rereads.iter_mut().filter_map(|(&id, survey)| Some((id, survey.as_mut()?)));
-        let Some((id, survey)) = open.find(|(_, survey)| survey.has(ticket)) else {
+        let mut pending = self.rereads.iter_mut().filter_map(|(&id, survey)| Some((id, survey.as_mut()?)));
+        let Some((id, survey)) = pending.find(|(_, survey)| survey.has(ticket)) else {
             return Ok(ControlFlow::Continue(()));
         };
         let Some(read) = survey.take(ticket, result, master) else { return Ok(ControlFlow::Continue(())) };
@@ -360,7 +360,7 @@ impl<'a> Watcher<'a> {
         if observed.booted { (self.on_event)(&WatchEvent::Restarted(id)) } else { ControlFlow::Continue(()) }
     }
 
-    /// Why the nodes send no TPDOs.
+    /// Returns why the nodes send no TPDOs.
     fn silences(&self, findings: &BTreeMap<NodeId, Findings>, now: Mono) -> Vec<(NodeId, Silence)> {
         let context =
             RequestContext { waited: now.since(self.start), syncs_sent: None, requests: false, was_started: false };
@@ -379,7 +379,7 @@ impl<'a> Watcher<'a> {
         self.nodes.iter().map(|node| (node.id, objects_to_read(node, &has_mapped_object))).collect()
     }
 
-    /// The result at the end.
+    /// Returns the result at the end.
     fn result(&mut self, master: &mut Master<'_>) -> Result<ControlFlow<()>, Failure> {
         if self.has_received {
             return Ok(ControlFlow::Break(()));
@@ -388,7 +388,7 @@ impl<'a> Watcher<'a> {
             return Err(Failure::at(node, LogFailure::UnknownMapping));
         }
         if self.setup.is_some() {
-            // No advice is possible for the nodes of a recording.
+            // The nodes of a recording cannot be read, so no reasons are known.
             return Err(Failure::general(PdoFailure::NothingReceived { nodes: Vec::new() }));
         }
         let now = master.now();
@@ -400,7 +400,7 @@ impl<'a> Watcher<'a> {
     }
 }
 
-/// Whether a TPDO contains an object.
+/// Whether a TPDO contains any object.
 fn has_mapped_object(tpdo: &Tpdo) -> bool {
     !tpdo.mapping.is_empty()
 }

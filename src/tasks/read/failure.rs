@@ -32,7 +32,7 @@ pub enum ReadFailure {
     },
     /// The object is text or bytes.
     NotNumber {
-        /// The object, as it was named.
+        /// The object as entered by the user.
         signal: String,
     },
     /// The type of the object is unknown.

@@ -86,7 +86,7 @@ fn read_by(values: ReadValues, master: &mut Master<'_>, node: &Node) -> Result<E
     let (register, count) = (found.get(&REGISTER).copied(), found.get(&HISTORY).copied());
     let register = register.and_then(|bits| u8::try_from(bits).ok());
     if register.is_none() && count.is_none() {
-        // Without an answer, it is unknown whether the node has them.
+        // Without an answer, it is unknown whether the node has these objects.
         read_each(master, node, &present)?;
         return Err(Failure::at(node.id, SettingsFailure::NoErrorObjects));
     }
@@ -100,12 +100,12 @@ fn read_by(values: ReadValues, master: &mut Master<'_>, node: &Node) -> Result<E
         register,
         register_text: register.map(|bits| register_text(node, bits)).unwrap_or_default(),
         count,
-        history: history.map(|raw| past(node, raw)).collect(),
+        history: history.map(|raw| past_error(node, raw)).collect(),
         counters: counters(master, node)?,
     })
 }
 
-/// The values of optional objects. Those without a valid answer are recorded as unknown.
+/// Reads the values of optional objects. Objects without a valid answer are recorded as unknown.
 fn values(master: &mut Master<'_>, node: &Node, objects: &[ObjectId]) -> Result<Vec<Option<Value>>, Failure> {
     let items: Vec<_> = objects.iter().map(|&object| (node.id, object, node.data_type(object))).collect();
     Ok(Reader::new(master).values(&items)?)
@@ -128,7 +128,7 @@ fn register_text(node: &Node, bits: u8) -> String {
     description.map_or_else(|| ErrorRegister(bits).to_string(), |description| description.register_text(bits))
 }
 
-fn past(node: &Node, raw: u32) -> PastError {
+fn past_error(node: &Node, raw: u32) -> PastError {
     let description = node.model.as_ref().map(|model| &model.description);
     let layout = description.map_or(ErrorHistory::default(), |description| description.error_history);
     let (code, bytes) = layout.read(raw);
@@ -138,7 +138,7 @@ fn past(node: &Node, raw: u32) -> PastError {
     PastError { raw, code, text, detail }
 }
 
-/// The meaning of bytes 3 and 4 of an emergency: `channel 1, status 0x03`.
+/// Returns the meaning of bytes 3 and 4 of an emergency: `channel 1, status 0x03`.
 fn detail(entry: &EmergencyEntry, bytes: [u8; 2]) -> String {
     let parts = entry.bytes.iter().zip(bytes).filter_map(|(meaning, byte)| {
         let folded = meaning.to_lowercase();
@@ -173,7 +173,7 @@ pub fn clear(master: &mut Master<'_>, node: &Node) -> Result<(Errors, Errors), F
     write(master, node, HISTORY, &[0; 4][..width])?;
     let now = read_by(read_each, master, node)?;
     let left = now.count.unwrap_or(0);
-    // If there are fewer or different errors, they are new.
+    // If there are fewer or different errors, they are newer than the deletion.
     let are_new = left < count || now.history != before.history;
     if left > 0 && !are_new {
         let cause = SettingsFailure::HistoryNotCleared { count: left };
