@@ -21,7 +21,7 @@ pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool
     check_capability(master, device, StoreCommand::Restore, group)?;
     let objects = snapshot::objects(device, &[group]);
     let (before, state) = match reset {
-        true => (snapshot::take(master, device, &objects)?, state::state(master, node)?),
+        true => (snapshot::read_settings(master, device, &objects)?, state::state(master, node)?),
         false => (Vec::new(), None),
     };
     send(master, device, StoreCommand::Restore, group)?;
@@ -31,7 +31,7 @@ pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool
         report.notes.push(note(StoreFact::AfterReset(group)));
         return Ok(report);
     }
-    let read = |master: &mut Master<'_>| snapshot::take(master, device, &objects);
+    let read = |master: &mut Master<'_>| snapshot::read_settings(master, device, &objects);
     let (after, state_notes) = snapshot::reset(master, node, state, read)
         .map_err(|failure| failure.with(node, StoreEffect::NotVerified(StoreCommand::Restore)))?;
     report.notes.extend(state_notes);

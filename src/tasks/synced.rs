@@ -9,12 +9,12 @@ use crate::node::Node;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// The number of TPDOs that may arrive in excess if another node sends SYNC. The SYNC before the first TPDO may not
-/// have been received.
+/// If another node sends SYNC, this many surplus TPDOs are tolerated, because the SYNC before the first TPDO may have
+/// been missed.
 const FOREIGN_TOLERANCE: u64 = 1;
 
-/// A TPDO of unknown transmission type is treated as synchronous if a pair of it follows this many SYNC messages in a
-/// row.
+/// A TPDO of unknown transmission type is treated as synchronous if a pair of its frames follows each of this many
+/// consecutive SYNC messages.
 const PAIRS: u32 = 3;
 
 /// The two frames of a pair arrive within 1/`PAIR_DIVISOR` of the SYNC interval.
@@ -30,7 +30,7 @@ pub(super) struct Surplus {
     pub(super) node: NodeId,
     /// The TPDO.
     pub(super) number: TpdoNumber,
-    /// Whether its values differ from those of the previous frame. They then come from two devices.
+    /// Whether its values differ from the values of the previous frame. Two devices then send this TPDO.
     pub(super) differs: bool,
     /// Whether this is the first surplus of this kind from this TPDO.
     pub(super) is_new: bool,
@@ -42,9 +42,9 @@ struct SyncedTpdo {
     node: NodeId,
     number: TpdoNumber,
     sync: CanId,
-    /// The n; `None` if the transmission type is unknown.
+    /// The number n; `None` if the transmission type is unknown.
     every: Option<u64>,
-    /// SYNC messages, remote requests, and the TPDOs after the first SYNC.
+    /// The numbers of SYNC messages, of remote requests, and of TPDOs after the first SYNC.
     syncs: u64,
     requests: u64,
     received: u64,
@@ -148,13 +148,13 @@ impl SyncedTpdos {
         }
     }
 
-    /// SYNC was sent with this COB-ID.
+    /// Counts a SYNC that was sent with this COB-ID.
     pub(super) fn on_sync(&mut self, id: CanId, at: Mono) {
         self.tpdos.values_mut().filter(|tpdo| tpdo.sync == id).for_each(|tpdo| tpdo.on_sync(at));
     }
 
-    /// Whether this TPDO may still have a second sender that is not detected yet. This is so only if another node may
-    /// send SYNC.
+    /// Whether this TPDO may still have a second sender that is not detected yet. This is possible only if another node
+    /// may send SYNC.
     pub(super) fn may_have_second_sender(&self, id: CanId) -> bool {
         !self.is_producer && self.tpdos.get(&id).is_some_and(|tpdo| !tpdo.is_decided())
     }
@@ -164,7 +164,7 @@ impl SyncedTpdos {
         self.is_producer || self.tpdos.values().all(SyncedTpdo::is_decided)
     }
 
-    /// Frames were lost, perhaps SYNC messages.
+    /// Counts from zero again, because SYNC messages may be among the lost frames.
     pub(super) fn on_lost_frames(&mut self) {
         for tpdo in self.tpdos.values_mut() {
             (tpdo.syncs, tpdo.requests, tpdo.received, tpdo.pairs) = (0, 0, 0, 0);
@@ -205,8 +205,9 @@ mod tests {
     use super::*;
     use crate::canopen::pdo::CobId;
 
-    /// The result for a TPDO at every n-th SYNC (0: its type is unknown): `S` is SYNC, `-` a pause, and other letters
-    /// are TPDOs with this content, one every millisecond. `F` is a SYNC of another node.
+    /// Returns the surplus frames (index, whether they differ) of a TPDO at every n-th SYNC (0: its type is unknown):
+    /// `S` is SYNC, `-` a pause, and other letters are TPDOs with this content, one every millisecond. `F` is a SYNC of
+    /// another node.
     fn found(is_producer: bool, every: u8, frames: &str) -> Vec<(usize, bool)> {
         let mut node = Node::new(NodeId::new(5).expect("a node-ID"));
         node.tpdos.push(Tpdo {

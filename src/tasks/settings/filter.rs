@@ -88,7 +88,7 @@ fn constant_object(signal: &Signal) -> ObjectId {
     ObjectId::new(0x61a1, signal.channel)
 }
 
-/// The meaning of a filter type (61A0h), from the description, else from CiA 404.
+/// Returns the meaning of a filter type (61A0h), from the description, else from CiA 404.
 pub(in crate::tasks) fn meaning(node: &Node, signal: &Signal, code: u64) -> String {
     let described = node.described(kind_object(signal)).and_then(|entry| entry.meaning(code));
     described.map_or_else(
@@ -110,7 +110,7 @@ pub fn has_filter(node: &Node, signal: &Signal) -> bool {
     node.may_have(kind_object(signal)) || node.may_have(constant_object(signal))
 }
 
-/// The filter of one signal, or of every signal with a filter.
+/// Reads the filter of one signal, or of every signal with a filter.
 ///
 /// # Errors
 /// No such signal, no filter, no answer.
@@ -123,7 +123,7 @@ pub fn show(master: &mut Master<'_>, node: &Node, signal: Option<&str>) -> Resul
     for signal in signals.into_iter().filter(|signal| has_filter(node, signal)) {
         let filter = filter_of(master, node, signal)?;
         filters.extend(filter.map(|filter| {
-            let notes = doubts(node, signal, &filter);
+            let notes = effect_notes(node, signal, &filter);
             FilterReport { filter, damping_shown: None, notes }
         }));
     }
@@ -184,7 +184,7 @@ pub fn set(
     }
     let now = filter_of(master, node, signal)?.ok_or_else(no_filter)?;
     let damping_shown = damping.map(|_| now.constant != before.constant);
-    let mut notes = doubts(node, signal, &now);
+    let mut notes = effect_notes(node, signal, &now);
     if damping_shown == Some(false) {
         notes.push(Note::of_node(node.id, SettingsFact::DampingNotShown { constant: now.constant }));
     }
@@ -194,8 +194,8 @@ pub fn set(
     Ok(FilterReport { filter: now, damping_shown, notes })
 }
 
-/// Notes about unexpected effects of a filter, from the description.
-fn doubts(node: &Node, signal: &Signal, filter: &FilterOf) -> Vec<Note> {
+/// Returns notes about unexpected effects of a filter, from the description.
+fn effect_notes(node: &Node, signal: &Signal, filter: &FilterOf) -> Vec<Note> {
     let mut notes = Vec::new();
     let is_repeating = filter.kind.starts_with(FilterType::Repeating.word());
     let constant = filter.constant.filter(|_| !is_repeating);
@@ -218,7 +218,7 @@ fn doubts(node: &Node, signal: &Signal, filter: &FilterOf) -> Vec<Note> {
     notes
 }
 
-/// The object and the number of milliseconds that set a damping. `kind` is the filter type to set.
+/// Returns the object and the number of milliseconds that set a damping. `kind` is the filter type to set.
 fn damping_write(
     node: &Node,
     signal: &Signal,
@@ -238,7 +238,8 @@ fn damping_write(
     Ok((object, milliseconds.map_err(|_| Failure::at(node.id, SettingsFailure::DampingTooLong))?))
 }
 
-/// The code of a type on this device, if the meaning is the same. The MC1609, for example, may use 0 for a filter.
+/// Returns the code of a filter type, if the code has this meaning on this device. On the MC1609, for example, 0 may be
+/// a filter.
 fn code_of(node: &Node, signal: &Signal, kind: FilterType) -> Result<u8, Failure> {
     let code = kind.code();
     let Some(entry) = node.described(kind_object(signal)).filter(|entry| !entry.values.is_empty()) else {

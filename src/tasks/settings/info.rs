@@ -21,7 +21,7 @@ use crate::tasks::{Failure, Kind};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-/// The page.
+/// The page of `info`.
 #[derive(Clone, Debug)]
 pub struct Info {
     /// Identity, signals and TPDOs.
@@ -159,10 +159,10 @@ struct Selection {
 
 impl Selection {
     fn of(node: &Node) -> Selection {
-        let channels: Vec<Vec<ObjectId>> = node.signals.iter().map(|signal| of_channel(node, signal)).collect();
+        let channels: Vec<Vec<ObjectId>> = node.signals.iter().map(|signal| channel_objects(node, signal)).collect();
         Selection {
             communication: communication(node),
-            own: own(node, &channels),
+            own: manufacturer_objects(node, &channels),
             channels,
             dates: [page::CALIBRATED, page::PRODUCED].map(|parts| page::date_objects(node, parts)),
             inhibit: node.tpdos.iter().map(|tpdo| tpdo.number.communication(3)).collect(),
@@ -203,7 +203,7 @@ pub fn read(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Res
     let errors = match read_errors(master, node) {
         Ok(errors) => Some(errors),
         Err(Failure { cause: Cause::Settings(SettingsFailure::NoErrorObjects), .. }) => None,
-        // Other objects answered before. A note names the silent ones.
+        // The device has answered other reads. A note names the objects without an answer.
         Err(failure) if failure.kind() == Kind::NoAnswer => None,
         Err(failure) => return Err(failure),
     };
@@ -250,8 +250,8 @@ fn communication(node: &Node) -> Vec<ObjectId> {
     objects
 }
 
-/// The objects of a channel in the order in which they are shown.
-fn of_channel(node: &Node, signal: &Signal) -> Vec<ObjectId> {
+/// Returns the objects of a channel in the order in which they are shown.
+fn channel_objects(node: &Node, signal: &Signal) -> Vec<ObjectId> {
     if !signal.has_channel() {
         return Vec::new();
     }
@@ -264,7 +264,7 @@ fn of_channel(node: &Node, signal: &Signal) -> Vec<ObjectId> {
     objects.extend(scaling);
     objects.extend([0x6126, 0x6127, 0x6132, 0x61a0, 0x61a1].map(at));
     objects.extend(Limit::ALL.map(|limit| limit.object(node, signal)));
-    // Manufacturer-specific objects with the channel as sub-index; minimum and maximum.
+    // Add manufacturer-specific objects that have the channel as sub-index, and minimum and maximum.
     let numbered = node.model.as_ref().into_iter().flat_map(|model| model.dictionary.iter());
     let numbered = numbered.filter(|entry| entry.numbered && entry.object.sub == signal.channel);
     objects.extend(numbered.map(|entry| entry.object).filter(|object| page::is_own(*object)));
@@ -277,9 +277,9 @@ fn of_channel(node: &Node, signal: &Signal) -> Vec<ObjectId> {
     objects
 }
 
-/// The manufacturer-specific objects without a channel. If no signals are described, also the objects of the profile,
-/// from the EDS or the profile.
-fn own(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
+/// Returns the manufacturer-specific objects without a channel. If no signals are described, also returns the objects
+/// of the profile, from the EDS or the profile.
+fn manufacturer_objects(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
     let taken: BTreeSet<ObjectId> = channels.iter().flatten().copied().collect();
     let values = node.signals.iter().flat_map(|signal| signal.other_objects.iter().copied());
     let startup = communication(node).into_iter();
@@ -290,7 +290,7 @@ fn own(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
     let of_profile = |object: ObjectId| !is_described && (0x6000..0xa000).contains(&object.index);
     let entries = entries.filter(|entry| {
         let object = entry.object;
-        // Sub-index 0 of a run is the number of its entries.
+        // Sub-index 0 of numbered entries is their number.
         let is_count = entry.name.ends_with("-entries") || entry.numbered && object.sub == 0;
         (page::is_own(object) || of_profile(object) && !is_count) && entry.access.is_readable()
     });
@@ -305,7 +305,7 @@ fn own(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
     own
 }
 
-/// The objects with the start and the end of the measuring range, if the signal can have them.
+/// Returns the objects with the start and the end of the measuring range, if the signal can have them.
 fn span(node: &Node, signal: &Signal) -> Option<[ObjectId; 2]> {
     let described = node.model.as_ref().map_or(&[][..], |model| &model.description.signals);
     let entry = described.iter().find(|entry| entry.name == signal.name);
@@ -315,7 +315,7 @@ fn span(node: &Node, signal: &Signal) -> Option<[ObjectId; 2]> {
     Some([start, end])
 }
 
-/// The present values. A value is `None` if it cannot be read.
+/// Reads the present values. A value is `None` if it cannot be read.
 fn samples(master: &mut Master<'_>, node: &Node) -> Result<Vec<Option<Sample>>, Failure> {
     if node.signals.is_empty() {
         return Ok(Vec::new());
@@ -340,8 +340,8 @@ fn samples(master: &mut Master<'_>, node: &Node) -> Result<Vec<Option<Sample>>, 
     Ok(samples)
 }
 
-/// The NMT state, if a heartbeat shows it soon. Node guarding is not used, because it would disturb the toggle bit for
-/// another guarding master.
+/// Returns the NMT state, if a heartbeat shows it within a short time. Node guarding is not used, because it would
+/// disturb the toggle bit for another guarding master.
 fn state(
     master: &mut Master<'_>,
     node: &Node,

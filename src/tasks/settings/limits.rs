@@ -16,7 +16,7 @@ use crate::tasks::{Fact, Failure, Kind, Note};
 /// One of the four settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// x133h: a change of at least this triggers the TPDO.
+    /// x133h: a change by at least this value triggers the TPDO.
     Delta,
     /// x134h: a value that falls below this limit triggers the TPDO.
     Lower,
@@ -72,7 +72,7 @@ pub fn has_limits(node: &Node, signal: &Signal) -> bool {
     Limit::ALL.iter().any(|limit| node.may_have(limit.object(node, signal)))
 }
 
-/// The limits of a signal.
+/// Reads the limits of a signal.
 ///
 /// # Errors
 /// No such signal, no limits, no answer.
@@ -93,7 +93,7 @@ pub fn show(master: &mut Master<'_>, node: &Node, signal: &str) -> Result<Limits
         let objects = [Limit::Delta, Limit::Hysteresis].map(|limit| limit.object(node, signal));
         return Err(Failure::at(node.id, SettingsFailure::NoLimits { signal: signal.name.clone(), objects }));
     }
-    let silent = silent(node, signal, &values);
+    let silent = silent_tpdos(node, signal, &values);
     let note = |tpdo: &String| Note::of_node(node.id, SettingsFact::MayNeverSend { tpdo: tpdo.clone() });
     let notes = silent.iter().map(note).collect();
     Ok(Limits { node: node.id, signal: signal.name.clone(), values, silent, notes })
@@ -135,7 +135,7 @@ pub fn set(master: &mut Master<'_>, node: &Node, signal: &str, wanted: &[(Limit,
         if matches!(failure.kind(), Kind::NoAnswer | Kind::Bus | Kind::Interrupted) {
             return Err(failure.with(node.id, SettingsEffect::LimitsUnknown { signal }));
         }
-        // An acknowledged object with another value is also restored.
+        // If the device acknowledged this object but has another value, this object is also restored.
         let done = if failure.kind() == Kind::Unexpected { at + 1 } else { at };
         let mut is_restored = true;
         for write in writes.iter().take(done).rev() {
@@ -188,8 +188,8 @@ fn limit_write(
     Ok(LimitWrite { limit, object, rises: number > old, bytes, previous: encode(old).unwrap_or_default() })
 }
 
-/// The TPDOs with the signal that are sent only on events, if the delta is 0.
-fn silent(node: &Node, signal: &Signal, values: &[(Limit, ObjectId, ValueWithUnit)]) -> Vec<String> {
+/// Returns the TPDOs that contain the signal and are sent only on events, if the delta is 0.
+fn silent_tpdos(node: &Node, signal: &Signal, values: &[(Limit, ObjectId, ValueWithUnit)]) -> Vec<String> {
     let delta = values.iter().find(|(limit, ..)| *limit == Limit::Delta);
     if delta.is_none_or(|(_, _, quantity)| quantity.number.as_f64() != 0.0) {
         return Vec::new();

@@ -11,7 +11,7 @@ use crate::node::Node;
 use crate::node::write::write;
 use crate::tasks::{Failure, Kind};
 
-/// The lowest and highest value of a signal, also before a reset.
+/// The lowest and highest value of a signal, now and before a reset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MinMax {
     /// The values now.
@@ -33,16 +33,16 @@ pub struct Extremes {
     pub highest: Option<ValueWithUnit>,
 }
 
-/// The lowest and the highest value of every signal with these objects.
+/// Reads the lowest and the highest value of every signal that has these objects.
 ///
 /// # Errors
 /// [`SettingsFailure::NoMinMax`]; no answer.
 pub fn show(master: &mut Master<'_>, node: &Node) -> Result<Vec<MinMax>, Failure> {
-    let all = present(master, node)?;
+    let all = read_all(master, node)?;
     Ok(all.into_iter().map(|now| MinMax { now, before: None }).collect())
 }
 
-fn present(master: &mut Master<'_>, node: &Node) -> Result<Vec<Extremes>, Failure> {
+fn read_all(master: &mut Master<'_>, node: &Node) -> Result<Vec<Extremes>, Failure> {
     let mut all = Vec::new();
     for signal in &node.signals {
         let objects = ["minimum-pv", "maximum-pv"].map(|name| node.object_of(signal, name));
@@ -74,7 +74,7 @@ fn extremes(
 /// [`SettingsFailure::NoMinMaxReset`], [`SettingsFailure::MinMaxNotReset`]; the device rejects the signature or does
 /// not answer.
 pub fn reset(master: &mut Master<'_>, node: &Node) -> Result<Vec<MinMax>, Failure> {
-    let before = present(master, node)?;
+    let before = read_all(master, node)?;
     let mut all = Vec::new();
     for old in before {
         let signal = find_signal(node, Some(&old.signal))?;
@@ -104,7 +104,7 @@ pub fn reset(master: &mut Master<'_>, node: &Node) -> Result<Vec<MinMax>, Failur
 }
 
 /// Whether the values prove a reset. Without a reset, the lowest value only falls and the highest value only rises.
-/// `None` without proof: the values were equal before, or both were exceeded since then.
+/// Returns `None` if there is no proof: the values were equal before, or both were exceeded since then.
 fn is_reset(old: &Extremes, now: &Extremes) -> Option<bool> {
     let ends = |extremes: &Extremes| {
         let (lowest, highest) = extremes.lowest.zip(extremes.highest)?;

@@ -44,7 +44,7 @@ pub fn open(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Res
     Ok(survey_nodes(master, &[node], overrides)?.pop().unwrap_or_else(|| Node::new(node)))
 }
 
-/// The signal with this name; without a name the only signal of the node.
+/// Returns the signal with this name; without a name, the only signal of the node.
 ///
 /// # Errors
 /// The node has no such signal, or several signals and no name was given.
@@ -63,7 +63,7 @@ pub fn find_signal<'a>(node: &'a Node, name: Option<&str>) -> Result<&'a Signal,
     }
 }
 
-/// The names of the signals that `text` selects: one name, a list (`ch1,ch3`), a range (`ch1-ch4`, `ch1-4`), or
+/// Returns the names of the signals that `text` selects: one name, a list (`ch1,ch3`), a range (`ch1-ch4`, `ch1-4`), or
 /// `all`. `all` selects the signals for which `is_selected` is true; if there are none, all signals.
 ///
 /// # Errors
@@ -118,7 +118,7 @@ fn set_object(master: &mut Master<'_>, node: &Node, object: ObjectId, data: &[u8
     written.map(drop).map_err(|error| Failure::from(error).explained(node, object, data))
 }
 
-/// A value of an object in the unit of its signal; `None` if it is not a finite number.
+/// Converts a value of an object to the unit of its signal; `None` if it is not a finite number.
 fn quantity(signal: &Signal, value: &Value) -> Option<ValueWithUnit> {
     let number = signal.number(value).filter(|number| number.as_f64().is_finite())?;
     Some(ValueWithUnit { number, unit: signal.unit })
@@ -130,7 +130,7 @@ fn measured_quantity(node: &Node, signal: &Signal, object: ObjectId, value: &Val
     quantity(signal, value).filter(|_| !is_marker)
 }
 
-/// The bytes of a number in the unit of a signal. For integer types, the number is multiplied by 10^`digits`.
+/// Encodes a number that is in the unit of a signal. For integer types, the number is multiplied by 10^`digits`.
 pub(super) fn encode_quantity(number: f64, data_type: DataType, digits: u8) -> Result<Vec<u8>, QuantityError> {
     let text = match data_type {
         DataType::Real32 | DataType::Real64 => number.to_string(),

@@ -1,4 +1,4 @@
-//! Values of the page of `info`: meanings, dates, ranges, stored settings.
+//! Computes values for the page of `info`: meanings, dates, ranges, stored settings.
 
 use super::info::{Date, Meaning, Store};
 use super::{ValueWithUnit, filter, quantity};
@@ -25,7 +25,7 @@ pub(super) fn is_own(object: ObjectId) -> bool {
 /// The objects in the unit of a signal, as indices without the first digit.
 const IN_UNIT: [u16; 9] = [0x121, 0x123, 0x124, 0x133, 0x134, 0x135, 0x136, 0x148, 0x149];
 
-/// The meaning of a value.
+/// Returns the meaning of a value.
 pub(super) fn meaning(
     node: &Node,
     values: &BTreeMap<ObjectId, Value>,
@@ -72,20 +72,20 @@ fn is_in_unit(node: &Node, signal: &Signal, object: ObjectId) -> bool {
     standard || described || named
 }
 
-/// The objects of a date, if the description has all three.
+/// Returns the objects of a date, if the description has all three.
 pub(super) fn date_objects(node: &Node, names: [&str; 3]) -> Option<[ObjectId; 3]> {
     let dictionary = &node.model.as_ref()?.dictionary;
     let [year, month, day] = names.map(|name| dictionary.find(name).map(|entry| entry.object));
     Some([year?, month?, day?])
 }
 
-/// The date in three objects; `None` if one of them cannot be read.
+/// Returns the date in three objects; `None` if one of them cannot be read.
 pub(super) fn date(values: &BTreeMap<ObjectId, Value>, objects: [ObjectId; 3]) -> Option<Date> {
     let [year, month, day] = objects.map(|object| values.get(&object).cloned());
     Some(Date { parts: [year?, month?, day?] })
 }
 
-/// The start and the end of the measuring range.
+/// Returns the start and the end of the measuring range.
 pub(super) fn range(
     values: &BTreeMap<ObjectId, Value>,
     signal: &Signal,
@@ -95,14 +95,14 @@ pub(super) fn range(
     Some((end_of_range(start)?, end_of_range(end)?))
 }
 
-/// The bit rate setting of the device, if an object contains its code (MH-4 2321h).
+/// Returns the bit rate setting of the device, if an object contains its code (MH-4 2321h).
 pub(super) fn bit_rate(node: &Node, values: &BTreeMap<ObjectId, Value>) -> Option<u32> {
     let model = node.model.as_ref()?;
     let code = values.get(&model.dictionary.find("bit-rate")?.object)?.as_u64()?;
     model.description.bit_rates_of(AssignKind::Objects).get(&u8::try_from(code).ok()?).copied()
 }
 
-/// The groups of 1010h, and the settings that it stores.
+/// Returns the groups of 1010h, and the settings that the device stores.
 pub(super) fn store(node: &Node, values: &BTreeMap<ObjectId, Value>, at: ObjectId) -> Store {
     let groups = (1..=4).filter_map(|sub| {
         let capability = values.get(&at.with_sub(sub))?.as_u64()?;
@@ -114,8 +114,8 @@ pub(super) fn store(node: &Node, values: &BTreeMap<ObjectId, Value>, at: ObjectI
         return store;
     }
     let settings = objects.iter().filter(|entry| {
-        let acts = entry.signature.is_some_and(|signature| signature != Signature::Set);
-        entry.access == Access::Rw && !acts && entry.at.first.index != 0x1003
+        let is_command = entry.signature.is_some_and(|signature| signature != Signature::Set);
+        entry.access == Access::Rw && !is_command && entry.at.first.index != 0x1003
     });
     // Node-ID and bit rate are stored by another command.
     let methods = node.model.as_ref().map_or(&[][..], |model| &model.description.assign);

@@ -1,4 +1,5 @@
-//! The physical unit of a signal (6131h, or the object in the description), and the objects that are converted to a new unit.
+//! Shows or sets the physical unit of a signal (6131h, or the object in the description), and lists the objects that
+//! are converted to a new unit.
 
 use super::{SettingsFact, SettingsFailure, ValueWithUnit, find_signal, measured_quantity, read_each, set_object};
 use crate::canopen::id::NodeId;
@@ -57,7 +58,7 @@ pub struct Rescaled {
     pub stale: bool,
 }
 
-/// The kind of conversion of a number if the unit of its signal changes.
+/// How a number is converted if the unit of its signal changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::tasks) enum Scale {
     /// A measured value, which changes by itself.
@@ -93,7 +94,7 @@ const IN_UNIT: [(u16, Scale); 10] = [
     (0x136, Scale::Distance),
 ];
 
-/// The unit of one signal, or of every signal with a unit.
+/// Returns the unit of one signal, or of every signal with a unit.
 ///
 /// # Errors
 /// No such signal; [`SettingsFailure::NoUnit`].
@@ -192,17 +193,17 @@ fn digits(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Optio
     Ok(digits.or(signal.digits))
 }
 
-/// `bar, psi, MPa`.
+/// Formats units as a list: `bar, psi, MPa`.
 pub fn list(units: &[Unit]) -> String {
     units.iter().map(Unit::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Whether the unit of a signal has the same quantity.
+/// Whether the unit of a signal and `unit` are units of the same quantity.
 pub fn is_alike(signal: &Signal, unit: Unit) -> bool {
     signal.unit.is_some_and(|present| present.convert(0.0, unit.beside(present)).is_some())
 }
 
-/// The signal with this name; without a name the only signal with a unit of the same quantity.
+/// Returns the signal with this name; without a name, the only signal with a unit of the same quantity.
 fn choose<'a>(node: &'a Node, name: Option<&str>, unit: Unit) -> Result<&'a Signal, Failure> {
     let mut alike = node.signals.iter().filter(|signal| is_alike(signal, unit));
     match (name, alike.next(), alike.next()) {
@@ -223,7 +224,7 @@ pub(in crate::tasks) fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, 
     let standard = in_unit.flat_map(move |(low, scale)| {
         families.clone().map(move |family| (ObjectId::new(family | low, channel), scale))
     });
-    let also = signal.other_objects.iter().map(|&object| (object, Scale::Moving));
+    let other_values = signal.other_objects.iter().map(|&object| (object, Scale::Moving));
     let offset = signal.has_channel().then(|| (ObjectId::new(0x6127, channel), Scale::Distance));
     let described = node.model.as_ref().map_or(&[][..], |model| &model.description.objects).iter();
     let described = described.filter(|entry| entry.follows_unit == Some(channel));
@@ -231,7 +232,7 @@ pub(in crate::tasks) fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, 
     let named = ["minimum-pv", "maximum-pv"].into_iter().filter_map(|name| node.object_of(signal, name));
     let mut all: Vec<(ObjectId, Scale)> = standard
         .chain(offset)
-        .chain(also)
+        .chain(other_values)
         .chain(named.map(|object| (object, Scale::Moving)))
         .chain(described.map(|object| (object, Scale::Distance)))
         .filter(|&(object, _)| node.may_have(object))
@@ -250,7 +251,7 @@ fn is_stale(before: ValueWithUnit, after: ValueWithUnit, scale: Scale) -> bool {
         Number::Decimal { digits, .. } => 10f64.powi(-i32::from(digits)),
         Number::Real32(_) | Number::Real64(_) => 0.0,
     };
-    was == is && (expected - is).abs() > step + 1e-6 * expected.abs()
+    old_number == new_number && (expected - new_number).abs() > step + 1e-6 * expected.abs()
 }
 
 #[cfg(test)]

@@ -88,9 +88,10 @@ pub enum StoreEffect {
 /// Notes about a store or restore.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StoreFact {
-    /// These groups are stored instead of all, which would reset these COB-IDs. A value is `None` if it cannot be read.
+    /// These groups are stored instead of the group "all", which would reset these COB-IDs. A value is `None` if it
+    /// cannot be read.
     InsteadOfAll(Vec<(ObjectId, Option<u64>)>),
-    /// Only the group of all settings stores these settings.
+    /// Only the group "all" stores these settings.
     OnlyInAll(Vec<String>),
     /// The device does not store these settings, and they are not at their defaults.
     NotStored(Vec<Snapshot>),

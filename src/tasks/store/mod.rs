@@ -74,7 +74,7 @@ impl Group {
         }
     }
 
-    /// The names of groups: `all`, `comm+app`.
+    /// Returns the names of groups: `all`, `comm+app`.
     pub fn names(groups: &[Group]) -> String {
         groups.iter().map(|group| group.as_str()).collect::<Vec<_>>().join("+")
     }
@@ -187,7 +187,7 @@ pub fn store(master: &mut Master<'_>, device: &Node, group: Group, verify: bool)
 /// Carries out a plan; see [`store`].
 ///
 /// # Errors
-/// As [`store`].
+/// The errors of [`store`].
 pub fn carry_out(
     master: &mut Master<'_>,
     device: &Node,
@@ -197,7 +197,7 @@ pub fn carry_out(
     let node = device.id;
     let before = if verify {
         let objects = snapshot::objects(device, &plan.groups);
-        Some((snapshot::take(master, device, &objects)?, node::state::state(master, node)?))
+        Some((snapshot::read_settings(master, device, &objects)?, node::state::state(master, node)?))
     } else {
         None
     };
@@ -249,7 +249,7 @@ pub(super) fn check_capability(
     Err(Failure::at(device.id, cause).of_object(object))
 }
 
-/// The COB-IDs that differ from their defaults or cannot be read.
+/// Returns the COB-IDs that differ from their defaults or cannot be read.
 fn custom_cob_ids(master: &mut Master<'_>, device: &Node) -> Result<Vec<(ObjectId, Option<u64>)>, Failure> {
     let is_cob_id = |object: ObjectId| {
         object == ObjectId::new(0x1014, 0) || (0x1800..0x1a00).contains(&object.index) && object.sub == 1
@@ -305,7 +305,7 @@ fn answers(master: &mut Master<'_>, device: &Node) -> Option<bool> {
 /// Checks that all settings are as before the reset.
 fn compare(master: &mut Master<'_>, device: &Node, before: &[Snapshot]) -> Result<(), Failure> {
     let objects: Vec<ObjectId> = before.iter().map(|setting| setting.object).collect();
-    let after = snapshot::take(master, device, &objects)?;
+    let after = snapshot::read_settings(master, device, &objects)?;
     let differs = |setting: &&Snapshot| !after.contains(setting);
     let difference = |setting: &Snapshot| Difference {
         expected: setting.clone(),

@@ -17,7 +17,7 @@ const COMMUNICATION: [u16; 11] =
     [0x1005, 0x1006, 0x1007, 0x100c, 0x100d, 0x1012, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
 const APPLICATION: [u16; 14] =
     [0x6110, 0x6112, 0x6114, 0x6124, 0x6126, 0x6127, 0x6131, 0x6132, 0x6133, 0x6134, 0x6135, 0x6136, 0x61a0, 0x61a1];
-/// The number of TPDOs and channels that are read on such a device.
+/// The number of TPDOs and channels that are read in this case.
 const MAX_NUMBER: u8 = 4;
 
 /// The value of an object at one time.
@@ -41,13 +41,13 @@ impl Snapshot {
     }
 }
 
-/// The objects of the description; `None` if the description does not list the stored objects.
+/// Returns the objects of the description; `None` if the description does not list the stored objects.
 fn described(device: &Node) -> Option<&[ObjectEntry]> {
     let entries = &device.model.as_ref()?.description.objects;
     entries.iter().any(|entry| entry.stored.is_some()).then_some(entries)
 }
 
-/// The readable settings of these groups.
+/// Returns the readable settings of these groups.
 pub(in crate::tasks) fn objects(device: &Node, groups: &[Group]) -> Vec<ObjectId> {
     let is_included = |stored: &str| groups.iter().any(|group| group.contains(stored));
     if let Some(entries) = described(device) {
@@ -78,7 +78,7 @@ pub(in crate::tasks) fn objects(device: &Node, groups: &[Group]) -> Vec<ObjectId
 ///
 /// # Errors
 /// No answer, protocol errors, bus errors and Ctrl-C.
-pub(in crate::tasks) fn take(
+pub(in crate::tasks) fn read_settings(
     master: &mut Master<'_>,
     device: &Node,
     objects: &[ObjectId],
@@ -103,10 +103,11 @@ pub(in crate::tasks) fn take(
     Ok(settings)
 }
 
-/// The settings that the device does not store (according to its description) and that differ from their defaults.
+/// Reads the settings that the device does not store (according to its description) and that differ from their
+/// defaults.
 ///
 /// # Errors
-/// As [`take`].
+/// The errors of [`read_settings`].
 pub(super) fn not_stored(master: &mut Master<'_>, device: &Node) -> Result<Vec<Snapshot>, Failure> {
     let Some(entries) = described(device) else { return Ok(Vec::new()) };
     let objects: Vec<ObjectId> = entries
@@ -116,12 +117,12 @@ pub(super) fn not_stored(master: &mut Master<'_>, device: &Node) -> Result<Vec<S
         .filter(|entry| entry.name != "error-count")
         .flat_map(|entry| entry.objects())
         .collect();
-    let mut settings = take(master, device, &objects)?;
+    let mut settings = read_settings(master, device, &objects)?;
     settings.retain(|setting| default(device, setting.object).is_some_and(|default| default != setting.bytes));
     Ok(settings)
 }
 
-/// The factory default of an object in the description.
+/// Returns the factory default of an object in the description.
 pub(in crate::tasks) fn default(device: &Node, object: ObjectId) -> Option<Vec<u8>> {
     device.model.as_ref()?.dictionary.get(object)?.default_bytes(device.id)
 }
