@@ -42,7 +42,7 @@ pub enum ZeroTarget {
 }
 
 impl ZeroTarget {
-    /// The name of the command.
+    /// Returns the name of the command.
     pub fn as_str(self) -> &'static str {
         match self {
             ZeroTarget::Autozero => "autozero",
@@ -215,9 +215,9 @@ impl<'a> Procedure<'a> {
             return Err(Failure::at(device.id, cause));
         }
         let offsets = channel::offsets(master, device, &channel)?;
-        let group = group(master, device, &channel, options.store)?;
+        let group = store_group(master, device, &channel, options.store)?;
         let before = samples::read_samples(master, device, &channel.signal.name, options.samples)?;
-        let decimals = decimals(channel.range, channel.signal.digits);
+        let decimals = shown_decimals(channel.range, channel.signal.digits);
         Ok(Procedure { target: options.target, device, channel, limits, decimals, offsets, before, group })
     }
 
@@ -409,7 +409,7 @@ impl<'a> Procedure<'a> {
 
 /// Returns the store group that contains the offset. If the description does not name it, this is the application
 /// settings if the device can store them separately.
-fn group(master: &mut Master<'_>, device: &Node, channel: &Channel, stores: bool) -> Result<Group, Failure> {
+fn store_group(master: &mut Master<'_>, device: &Node, channel: &Channel, stores: bool) -> Result<Group, Failure> {
     let described = device.model.iter().flat_map(|model| &model.description.objects);
     let entry = described
         .filter(|entry| entry.stored.is_some())
@@ -432,7 +432,7 @@ fn unit_text(unit: Option<Unit>) -> String {
 
 /// Returns the number of decimal digits that resolves 0.01 % of the measuring range. If the range is unknown, returns
 /// the number of decimal digits of the device.
-fn decimals(range: Option<f64>, digits: Option<u8>) -> usize {
+fn shown_decimals(range: Option<f64>, digits: Option<u8>) -> usize {
     let step = range.map(|range| range / 1e4).filter(|step| *step > 0.0);
     let needed = step.and_then(|step| (0..=9).find(|&decimals| 10f64.powi(-decimals) <= step * 1.000_001));
     let needed = needed.and_then(|decimals| usize::try_from(decimals).ok());

@@ -58,7 +58,7 @@ pub struct CheckReport {
 }
 
 impl CheckReport {
-    /// The report of a check that stopped before the first measurement.
+    /// Creates the report of a check that stopped before the first measurement.
     pub fn not_measured(expressions: &[Expression], failure: Failure) -> CheckReport {
         let verdict = |expression: &Expression| Verdict::no_data(expression.text(), None, Reason::Failed(0));
         CheckReport {
@@ -80,7 +80,7 @@ impl CheckReport {
         of(Outcome::Ok).any(|verdict| verdict.node.is_some_and(|node| !lacks_data(node)))
     }
 
-    /// The number of verdicts with this outcome.
+    /// Returns the number of verdicts with this outcome.
     pub fn count(&self, outcome: Outcome) -> usize {
         self.verdicts.iter().filter(|verdict| verdict.outcome == outcome).count()
     }
@@ -286,7 +286,7 @@ pub struct Checker<'a> {
 }
 
 impl<'a> Checker<'a> {
-    /// With `skip_unsupported`, a node without the signal is skipped if another node has it.
+    /// Creates a checker. With `skip_unsupported`, a node without the signal is skipped if another node has the signal.
     pub fn new(
         expressions: &[Expression],
         nodes: &[NodeId],

@@ -45,11 +45,11 @@ pub struct DraftObject {
 const MAX_CHANNELS: usize = 16;
 
 /// The objects that a channel has in each family of CiA 404: the index without its first digit.
-const FAMILY: [u16; 16] =
+const FAMILY_OBJECTS: [u16; 16] =
     [0x100, 0x120, 0x121, 0x122, 0x123, 0x124, 0x126, 0x127, 0x130, 0x133, 0x134, 0x135, 0x136, 0x138, 0x148, 0x149];
 
 /// The objects of a channel that are the same for all families.
-const CHANNEL: [u16; 9] = [0x6110, 0x6111, 0x6112, 0x6114, 0x6131, 0x6132, 0x6150, 0x61a0, 0x61a1];
+const CHANNEL_OBJECTS: [u16; 9] = [0x6110, 0x6111, 0x6112, 0x6114, 0x6131, 0x6132, 0x6150, 0x61a0, 0x61a1];
 
 /// Reads a device.
 ///
@@ -73,10 +73,10 @@ pub fn draft(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Re
     }
     let mut found: Vec<DraftObject> = Vec::new();
     for (object, value) in readable.iter().zip(values) {
-        found.extend(value.map(|value| described(&node, *object, Some(value))));
+        found.extend(value.map(|value| draft_object(&node, *object, Some(value))));
     }
     let unreadable = candidates.iter().filter(|object| !readable.contains(object));
-    found.extend(unreadable.map(|object| described(&node, *object, None)));
+    found.extend(unreadable.map(|object| draft_object(&node, *object, None)));
     found.sort_by_key(|found| found.object);
     Ok(Draft { node, objects: found })
 }
@@ -99,15 +99,15 @@ fn candidates(node: &Node) -> BTreeSet<ObjectId> {
         all.extend(signal.status);
     }
     for signal in node.channels().into_iter().take(MAX_CHANNELS) {
-        all.extend(CHANNEL.map(|index| ObjectId::new(index, signal.channel)));
+        all.extend(CHANNEL_OBJECTS.map(|index| ObjectId::new(index, signal.channel)));
         let families = PROCESS_VALUES.iter().map(|(index, _)| index & 0xf000);
-        all.extend(families.flat_map(|family| FAMILY.map(|low| ObjectId::new(family | low, signal.channel))));
+        all.extend(families.flat_map(|family| FAMILY_OBJECTS.map(|low| ObjectId::new(family | low, signal.channel))));
     }
     all.extend(node.identity.profile().into_iter().flat_map(profiles::settings_of));
     all
 }
 
-fn described(node: &Node, object: ObjectId, value: Option<Value>) -> DraftObject {
+fn draft_object(node: &Node, object: ObjectId, value: Option<Value>) -> DraftObject {
     let entry = node.entry(object);
     let layout = node.layout();
     let mut mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);

@@ -1,8 +1,8 @@
 //! Why a node sends no measurements.
 //!
-//! [`diagnose`] decides from evidence, in this order: the last frames of the node ([`ObservedFrames`]), its present answers
-//! ([`Inquiry`]), and the parameters of the TPDOs with the requested signals. Causes that cannot be distinguished are
-//! reported together: see [`Running`].
+//! [`diagnose`] decides from evidence, in this order: the last frames of the node ([`ObservedFrames`]), its present
+//! answers ([`Inquiry`]) and the parameters of the TPDOs with the requested signals. Causes that cannot be
+//! distinguished are reported together: see [`Running`].
 
 mod inquiry;
 

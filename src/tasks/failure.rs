@@ -102,7 +102,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             Cause::Bus(error) => match **error {
@@ -143,7 +143,7 @@ impl Cause {
         }
     }
 
-    /// The abort code, if the device rejected an SDO request.
+    /// Returns the abort code, if the device rejected an SDO request.
     pub fn abort(&self) -> Option<AbortCode> {
         match self {
             Cause::Sdo(error) => match error.failure {
@@ -231,12 +231,12 @@ impl Failure {
         }
     }
 
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         self.cause.kind()
     }
 
-    /// The abort code, if the device rejected an SDO request.
+    /// Returns the abort code, if the device rejected an SDO request.
     pub fn abort(&self) -> Option<AbortCode> {
         self.cause.abort()
     }

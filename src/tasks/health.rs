@@ -175,7 +175,7 @@ impl HealthObserver<'_> {
     }
 
     /// Starts the next read: first the heartbeat time of each node, then the device type again and again.
-    fn read(&mut self, master: &mut Master<'_>) {
+    fn start_read(&mut self, master: &mut Master<'_>) {
         let nodes = &self.options.nodes;
         let now = master.now();
         let Some(&node) = nodes.get(self.reads % nodes.len().max(1)) else {
@@ -238,7 +238,7 @@ impl Waiter for HealthObserver<'_> {
                     return Ok(ControlFlow::Break(()));
                 }
                 if now >= self.next_read {
-                    self.read(master);
+                    self.start_read(master);
                 }
             }
             Happening::Sdo(ticket, _) => self.pending.retain(|(own, _)| *own != ticket),

@@ -53,7 +53,7 @@ pub enum HostFailure {
 }
 
 impl HostFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         Kind::Bus
     }

@@ -155,39 +155,39 @@ pub trait Observer {
         Ok(())
     }
 
-    /// A cycle of SYNC or polling starts. Numbers may be skipped.
+    /// Called when a cycle of SYNC or polling starts. Numbers may be skipped.
     fn cycle(&mut self, _number: u64, _at: Stamp) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
-    /// Samples that were requested in this cycle. This cycle may be earlier than the present cycle.
+    /// Called with samples that were requested in this cycle. This cycle may be earlier than the present cycle.
     fn polled(&mut self, _cycle: u64, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
         self.samples(samples, sources)
     }
 
-    /// Samples that were received together, in the order of the mapping.
+    /// Called with samples that were received together, in the order of the mapping.
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()>;
 
-    /// An event.
+    /// Called with an event.
     fn event(&mut self, event: &LogEvent, at: Stamp);
 
-    /// The present state of the expressions, as often as [`Observer::tick`].
+    /// Called with the present state of the expressions, as often as [`Observer::tick`].
     fn evaluated(&mut self, _evaluator: &Evaluator, _at: Stamp) {}
 
-    /// Time passes: called ten times a second.
+    /// Called ten times a second.
     fn tick(&mut self, at: Stamp, rows: u64) -> ControlFlow<()>;
 }
 
 /// The result of a recording.
 #[derive(Clone, Debug)]
 pub struct RecordingReport {
-    /// Values recorded.
+    /// The number of recorded values.
     pub rows: u64,
-    /// Time between the first value and the end.
+    /// The time between the first value and the end.
     pub length: Duration,
     /// The statistics of each source.
     pub statistics: Vec<(Source, Statistics)>,
-    /// Nodes whose setup could not be read, and which were not recorded. For a passive recording: requested signals that
+    /// Nodes whose setup could not be read, and which were not recorded. In a passive recording: requested signals that
     /// were not recorded.
     pub failed: Vec<Failure>,
     /// Nodes with a TPDO that two devices send. From then on, these TPDOs were ignored.
@@ -224,7 +224,7 @@ pub struct RecordingReport {
 const FIRST_SAMPLE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The interval of [`Observer::tick`].
-const TICK: Duration = Duration::from_millis(100);
+const TICK_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Records until the duration, the count, Ctrl-C or the observer ends the recording.
 ///
@@ -256,7 +256,7 @@ pub fn log(
         }),
     }
     recording.refuse_without_rtr()?;
-    recording.take_overloads();
+    recording.adopt_overloads();
     recording.update_sources();
     recording.ignore_nodes_without_signals();
     observer.sources(recording.decoder.sources())?;
@@ -388,7 +388,7 @@ fn finish(mut recording: Recording<'_>, result: Result<(), Error>) -> Result<Rec
 }
 
 /// Returns `period` times `n`, exact to the nanosecond. Saturates.
-fn nth(period: Duration, n: u64) -> Duration {
+fn multiply(period: Duration, n: u64) -> Duration {
     let nanoseconds = period.as_nanos().saturating_mul(u128::from(n));
     Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
 }

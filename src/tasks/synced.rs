@@ -15,7 +15,7 @@ const FOREIGN_TOLERANCE: u64 = 1;
 
 /// A TPDO of unknown transmission type is treated as synchronous if a pair of its frames follows each of this many
 /// consecutive SYNC messages.
-const PAIRS: u32 = 3;
+const MIN_PAIRS: u32 = 3;
 
 /// The two frames of a pair arrive within 1/`PAIR_DIVISOR` of the SYNC interval.
 const PAIR_DIVISOR: u32 = 4;
@@ -76,7 +76,7 @@ impl SyncedTpdo {
     /// Whether a TPDO that arrives now is in excess.
     fn is_surplus(&self, is_only_producer: bool) -> bool {
         let Some(every) = self.every else {
-            return self.is_shared || self.pairs + 1 >= PAIRS && self.has_pair() && self.requests == 0;
+            return self.is_shared || self.pairs + 1 >= MIN_PAIRS && self.has_pair() && self.requests == 0;
         };
         let due = self.requests
             + match is_only_producer {
@@ -88,7 +88,8 @@ impl SyncedTpdo {
 
     /// Whether enough SYNC messages were received to detect a second sender.
     fn is_decided(&self) -> bool {
-        self.last.is_none() || self.syncs >= self.every.map_or(u64::from(PAIRS) + 1, |every| every * SYNCS_TO_DECIDE)
+        self.last.is_none()
+            || self.syncs >= self.every.map_or(u64::from(MIN_PAIRS) + 1, |every| every * SYNCS_TO_DECIDE)
     }
 }
 
@@ -172,7 +173,7 @@ impl SyncedTpdos {
     }
 
     /// Handles a frame. Returns a surplus TPDO, which must not be used.
-    pub(super) fn take(&mut self, frame: &Frame, at: Mono) -> Option<Surplus> {
+    pub(super) fn on_frame(&mut self, frame: &Frame, at: Mono) -> Option<Surplus> {
         let is_only_producer = self.is_producer && !self.has_other_producer;
         let Some(tpdo) = self.tpdos.get_mut(&frame.id()) else {
             if !frame.is_remote() && self.tpdos.values().any(|tpdo| tpdo.sync == frame.id()) {
@@ -232,7 +233,7 @@ mod tests {
                 b'R' => "185#R1".to_owned(),
                 _ => format!("185#{letter:02X}"),
             };
-            let surplus = synced.take(&text.parse().expect("a frame"), now);
+            let surplus = synced.on_frame(&text.parse().expect("a frame"), now);
             found.extend(surplus.filter(|surplus| surplus.is_new).map(|surplus| (at, surplus.differs)));
         }
         found

@@ -69,9 +69,9 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
             fail(AutozeroFailure::NoSuchChannel { title: title.clone(), channel: number, available: available() })
         })?,
     };
-    let signal = signal(device, entry.channel)?.clone();
-    let absolute = absolute(master, device, entry)?;
-    let range = range(master, device, &signal, entry.range.as_ref())?;
+    let signal = find_signal(device, entry.channel)?.clone();
+    let absolute = read_absolute(master, device, entry)?;
+    let range = read_range(master, device, &signal, entry.range.as_ref())?;
     let signature = entry.signature.clone();
     let offsets = entry.offset.into_iter().collect();
     let is_described = entry.offset.is_some();
@@ -104,7 +104,7 @@ pub(super) fn find_tare(master: &mut Master<'_>, device: &mut Node, number: Opti
     let signature = device.described(object).and_then(|entry| entry.signature).unwrap_or(Signature::Tare);
     let offsets: Vec<ObjectId> = layout.find_in_family(signal, 0x138).into_iter().collect();
     let signal = Signal { value_object: (net, layout.data_type(net)), ..signal.clone() };
-    let range = range(master, device, &signal, None)?;
+    let range = read_range(master, device, &signal, None)?;
     device.signals.iter_mut().filter(|known| known.name == signal.name).for_each(|known| *known = signal.clone());
     Ok(Channel {
         signal,
@@ -121,7 +121,7 @@ pub(super) fn find_tare(master: &mut Master<'_>, device: &mut Node, number: Opti
 fn find_by_cia404(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
     let node = device.id;
     let signal = match (number, device.channels().as_slice()) {
-        (Some(number), _) => signal(device, number)?,
+        (Some(number), _) => find_signal(device, number)?,
         (None, [only]) => *only,
         (None, []) => return Err(Failure::at(node, ReadFailure::NoMeasuredValue)),
         (None, _) => {
@@ -146,12 +146,12 @@ fn find_by_cia404(master: &mut Master<'_>, device: &Node, number: Option<u8>) ->
     }
     let family = signal.value_object.0.index & 0xf000;
     let offsets = [0x6127, family | 0x124].map(|index| ObjectId::new(index, signal.channel)).to_vec();
-    let range = range(master, device, &signal, None)?;
+    let range = read_range(master, device, &signal, None)?;
     let signature = b"zero".to_vec();
     Ok(Channel { signal, object, signature, offsets, is_described: false, absolute: None, range })
 }
 
-fn signal(device: &Node, channel: u8) -> Result<&Signal, Failure> {
+fn find_signal(device: &Node, channel: u8) -> Result<&Signal, Failure> {
     device
         .signals
         .iter()
@@ -159,7 +159,7 @@ fn signal(device: &Node, channel: u8) -> Result<&Signal, Failure> {
         .ok_or_else(|| Failure::at(device.id, AutozeroFailure::NoMeasuredValueOnChannel { channel }))
 }
 
-fn absolute(master: &mut Master<'_>, device: &Node, entry: &Autozero) -> Result<Option<bool>, Failure> {
+fn read_absolute(master: &mut Master<'_>, device: &Node, entry: &Autozero) -> Result<Option<bool>, Failure> {
     let Some(absolute) = &entry.absolute else { return Ok(None) };
     match master.read(device.id, absolute.object, data_type(device, absolute.object, DataType::Unsigned(4)))? {
         Ok(kind) => Ok(kind.as_u64().map(|kind| kind == u64::from(absolute.value))),
@@ -203,7 +203,7 @@ fn read_number(
 }
 
 /// Reads the width of the measuring range in the present unit: the range of the sensor, else span start to span end.
-fn range(
+fn read_range(
     master: &mut Master<'_>,
     device: &Node,
     signal: &Signal,

@@ -123,7 +123,7 @@ pub enum OffsetChange {
 }
 
 impl AutozeroFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             AutozeroFailure::NoSuchChannel { .. }
@@ -143,7 +143,7 @@ impl AutozeroFailure {
         }
     }
 
-    /// The abort code, if the device rejected a request.
+    /// Returns the abort code, if the device rejected a request.
     pub fn abort(&self) -> Option<AbortCode> {
         match self {
             AutozeroFailure::NoObject { code, .. } => Some(*code),

@@ -91,7 +91,7 @@ pub enum FailedCheck {
     Unsteady {
         /// The signal.
         signal: String,
-        /// The difference of the greatest and the least reading.
+        /// The difference between the greatest and the least reading.
         spread: Quantity,
         /// The limit.
         limit: Quantity,

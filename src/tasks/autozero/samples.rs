@@ -28,12 +28,12 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// The mean; `None` if a reading was invalid.
+    /// Returns the mean; `None` if a reading was invalid.
     pub(super) fn mean(&self) -> Option<f64> {
         self.statistics.mean().filter(|_| self.bad.is_none() && self.statistics.invalid() == 0)
     }
 
-    /// The difference of the greatest and the least reading.
+    /// Returns the difference between the greatest and the least reading.
     pub(super) fn spread(&self) -> f64 {
         self.statistics.max().zip(self.statistics.min()).map_or(0.0, |(max, min)| max - min)
     }

@@ -28,7 +28,7 @@ pub enum CheckFailure {
 }
 
 impl CheckFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             CheckFailure::NotSatisfied { .. } => Kind::CheckFailed,

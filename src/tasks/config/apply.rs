@@ -154,7 +154,7 @@ pub fn apply(
         is_reset: false,
     };
     work.check_bus()?;
-    if !work.differing().is_empty() {
+    if !work.differing_targets().is_empty() {
         journal.begin(&work.before)?;
     }
     let result = work.carry_out();
@@ -185,14 +185,14 @@ struct Work<'m, 'bus> {
 
 impl Work<'_, '_> {
     /// Returns the settings whose present value on the device differs from the requested value.
-    fn differing(&self) -> Vec<&Wanted> {
+    fn differing_targets(&self) -> Vec<&Wanted> {
         let differs = |wanted: &&Wanted| self.now.content(&wanted.setting).as_ref() != Some(&wanted.content);
         self.targets.iter().filter(differs).collect()
     }
 
     fn address(&self) -> (Option<NodeId>, Option<u32>) {
         let number = |form: Form| {
-            let wanted = self.differing().into_iter().find(|wanted| wanted.setting.form == form)?;
+            let wanted = self.differing_targets().into_iter().find(|wanted| wanted.setting.form == form)?;
             if let Content::Number(number) = wanted.content { Some(number) } else { None }
         };
         let id = number(Form::NodeId).and_then(|id| u8::try_from(id).ok()).and_then(|id| NodeId::new(id).ok());
@@ -271,7 +271,7 @@ impl Work<'_, '_> {
         }
         let changed = pdo::change(self.master, &self.now.node, old, new)?;
         self.notes.extend(changed.notes);
-        let differing: Vec<Wanted> = self.differing().into_iter().cloned().collect();
+        let differing: Vec<Wanted> = self.differing_targets().into_iter().cloned().collect();
         let own = differing.iter().filter(|wanted| wanted.setting.stage == Stage::Tpdo(number));
         own.for_each(|wanted| self.record(wanted));
         // The next TPDO may use an identifier that has just become free.
@@ -337,7 +337,7 @@ impl Work<'_, '_> {
 
     /// Checks in the last snapshot that the device kept all values.
     fn check_kept(&self, is_after_reset: bool) -> Result<(), Failure> {
-        let wrong = self.differing().into_iter().filter(|wanted| wanted.setting.stage != Stage::Address);
+        let wrong = self.differing_targets().into_iter().filter(|wanted| wanted.setting.stage != Stage::Address);
         let settings: Vec<_> = wrong
             .map(|wanted| (wanted.entry.key.clone(), wanted.entry.value.clone(), self.now.show(&wanted.setting)))
             .collect();

@@ -13,7 +13,7 @@ use std::time::Duration;
 const SEARCH_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A device is unplugged if it is missing in this many searches in succession. In one search it may be restarting.
-const MISSES: u32 = 2;
+const MISSED_SEARCHES: u32 = 2;
 
 /// Finds devices that are new on the bus.
 #[derive(Clone, Debug, Default)]
@@ -59,7 +59,7 @@ impl Arrivals {
             None => other.node == device.node,
         };
         self.misses = if found.iter().any(is_device) { 0 } else { self.misses + 1 };
-        let is_gone = self.misses == MISSES;
+        let is_gone = self.misses == MISSED_SEARCHES;
         if is_gone {
             self.misses = 0;
         }

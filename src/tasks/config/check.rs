@@ -81,9 +81,9 @@ pub fn check(
         if CONDITIONS.contains(&entry.key.as_str()) || entry.key.starts_with("device.range.") {
             match check_condition(entry) {
                 Ok(()) => file.conditions.push(entry.clone()),
-                Err(problem) => check.mistake(entry, problem),
+                Err(problem) => check.add_mistake(entry, problem),
             }
-        } else if let Some(wanted) = check.entry(entry, &file) {
+        } else if let Some(wanted) = check.check_entry(entry, &file) {
             file.wanted.push(wanted);
         }
     }
@@ -100,11 +100,11 @@ pub fn check(
 fn check_condition(entry: &Entry) -> Result<(), Problem> {
     let is_number = matches!(entry.key.as_str(), "device.vendor" | "device.product" | "calibration.serial");
     match &entry.value {
-        Item::Text(text) if entry.key.starts_with("device.range.") => match range(text) {
+        Item::Text(text) if entry.key.starts_with("device.range.") => match parse_range(text) {
             Some(_) => Ok(()),
             None => Err(Problem::NotAQuantity { text: text.clone() }),
         },
-        item if is_number => match number(item) {
+        item if is_number => match parse_number(item) {
             Some(_) => Ok(()),
             None => Err(Problem::Type { expected: "a number (0x47)", found: item.kind() }),
         },
@@ -114,7 +114,7 @@ fn check_condition(entry: &Entry) -> Result<(), Problem> {
 }
 
 /// Parses a 32-bit number, given as an integer or as text.
-pub(super) fn number(item: &Item) -> Option<u32> {
+pub(super) fn parse_number(item: &Item) -> Option<u32> {
     match item {
         Item::Integer(number) => u32::try_from(*number).ok(),
         Item::Text(text) => crate::canopen::id::parse_u32(text),
@@ -123,7 +123,7 @@ pub(super) fn number(item: &Item) -> Option<u32> {
 }
 
 /// Parses a measuring range. Returns the start (if it is given), the end and the unit.
-pub(super) fn range(text: &str) -> Option<(Option<f64>, f64, Unit)> {
+pub(super) fn parse_range(text: &str) -> Option<(Option<f64>, f64, Unit)> {
     let quantity = |text: &str| -> Option<(f64, Unit)> {
         let (number, unit) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
         let unit = if unit.is_empty() { Unit::NONE } else { Unit::from_symbol(unit)? };
@@ -147,7 +147,7 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    fn mistake(&mut self, entry: &Entry, problem: Problem) {
+    fn add_mistake(&mut self, entry: &Entry, problem: Problem) {
         let is_key = matches!(problem, Problem::UnknownKey { .. } | Problem::Twice { .. });
         let place = if is_key { entry.key_at } else { entry.value_at };
         self.mistakes.push(Mistake { place, key: entry.key.clone(), problem });
@@ -185,32 +185,32 @@ impl Check<'_> {
         own.or_else(explicit).or_else(by_object)
     }
 
-    fn entry(&mut self, entry: &Entry, before: &FileSettings) -> Option<Wanted> {
+    fn check_entry(&mut self, entry: &Entry, before: &FileSettings) -> Option<Wanted> {
         let Some(setting) = self.find(&entry.key).cloned() else {
-            let problem = self.unknown(&entry.key);
-            self.mistake(entry, problem);
+            let problem = self.unknown_key(&entry.key);
+            self.add_mistake(entry, problem);
             return None;
         };
         if let Some(other) = before.wanted.iter().find(|wanted| wanted.setting.key == setting.key) {
-            self.mistake(entry, Problem::Twice { other: other.entry.key.clone() });
+            self.add_mistake(entry, Problem::Twice { other: other.entry.key.clone() });
             return None;
         }
         let read = setting.read(self.node, &self.scales, &entry.value);
-        match read.and_then(|content| self.allowed(&setting, content, &entry.value)) {
+        match read.and_then(|content| self.check_allowed(&setting, content, &entry.value)) {
             Ok(content) => content.map(|content| {
                 // An explicit COB-ID always belongs to [address].
                 let key = path(&setting, &content);
                 Wanted { entry: Entry { key, ..entry.clone() }, content, setting }
             }),
             Err(problem) => {
-                self.mistake(entry, problem);
+                self.add_mistake(entry, problem);
                 None
             }
         }
     }
 
     /// Returns the problem of an unknown key. It suggests the key of the same object, or similar keys.
-    fn unknown(&self, key: &str) -> Problem {
+    fn unknown_key(&self, key: &str) -> Problem {
         let object = object_of(self.node, key);
         let owner = object.and_then(|object| {
             self.settings
@@ -229,7 +229,12 @@ impl Check<'_> {
     }
 
     /// Checks the limits in the description.
-    fn allowed(&self, setting: &Setting, content: Option<Content>, item: &Item) -> Result<Option<Content>, Problem> {
+    fn check_allowed(
+        &self,
+        setting: &Setting,
+        content: Option<Content>,
+        item: &Item,
+    ) -> Result<Option<Content>, Problem> {
         let Some(content) = content else { return Ok(None) };
         if !setting.is_writable {
             let present = self.present.and_then(|present| Some((present.content(setting)?, present.show(setting))));
@@ -247,15 +252,15 @@ impl Check<'_> {
                     let high = high.unwrap_or_default().to_string();
                     return Err(Problem::Entries { high });
                 }
-                self.mappable(*number, entries, item)?;
+                self.check_mappable(*number, entries, item)?;
             }
-            (Content::Bytes(bytes), form) if !matches!(form, Form::Quantity(..)) => self.in_range(setting, bytes)?,
+            (Content::Bytes(bytes), form) if !matches!(form, Form::Quantity(..)) => self.check_range(setting, bytes)?,
             _ => {}
         }
         Ok(Some(content))
     }
 
-    fn mappable(
+    fn check_mappable(
         &self,
         number: crate::canopen::pdo::TpdoNumber,
         entries: &[crate::canopen::pdo::MappingEntry],
@@ -280,7 +285,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    fn in_range(&self, setting: &Setting, bytes: &[u8]) -> Result<(), Problem> {
+    fn check_range(&self, setting: &Setting, bytes: &[u8]) -> Result<(), Problem> {
         let value = setting.data_type.decode(bytes).ok();
         let Some(number) = value.as_ref().and_then(Value::as_f64) else { return Ok(()) };
         let shown = |number: f64| {
@@ -314,20 +319,20 @@ impl Check<'_> {
     fn check_combinations(&mut self, file: &FileSettings) {
         let mut found = Vec::new();
         for wanted in &file.wanted {
-            found.extend(self.crossed(wanted, file).map(|problem| (wanted.entry.clone(), problem)));
-            found.extend(self.excluded(wanted, file).map(|problem| (wanted.entry.clone(), problem)));
-            found.extend(self.same_id(wanted, file).map(|problem| (wanted.entry.clone(), problem)));
+            found.extend(self.crossed_limits(wanted, file).map(|problem| (wanted.entry.clone(), problem)));
+            found.extend(self.excluded_service(wanted, file).map(|problem| (wanted.entry.clone(), problem)));
+            found.extend(self.id_conflict(wanted, file).map(|problem| (wanted.entry.clone(), problem)));
         }
-        found.into_iter().for_each(|(entry, problem)| self.mistake(&entry, problem));
+        found.into_iter().for_each(|(entry, problem)| self.add_mistake(&entry, problem));
     }
 
     /// Returns the value of a setting after the change.
-    fn resulting(&self, setting: &Setting, file: &FileSettings) -> Option<Content> {
+    fn content_after(&self, setting: &Setting, file: &FileSettings) -> Option<Content> {
         let wanted = file.wanted.iter().find(|wanted| wanted.setting.key == setting.key);
         wanted.map(|wanted| wanted.content.clone()).or_else(|| self.present?.content(setting))
     }
 
-    fn crossed(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
+    fn crossed_limits(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
         let (base, name) = wanted.setting.key.rsplit_once('.')?;
         let (other, is_lower) = match name {
             "lower" => ("upper", true),
@@ -347,7 +352,7 @@ impl Check<'_> {
             Content::Bytes(bytes) => Number::from_value(&setting.data_type.decode(bytes).ok()?, 0).map(Number::as_f64),
             _ => None,
         };
-        let content = self.resulting(other, file)?;
+        let content = self.content_after(other, file)?;
         let (own, other_value) = (number(&wanted.setting, &wanted.content)?, number(other, &content)?);
         let is_crossed = if is_lower { own > other_value } else { other_value > own };
         let value = other.show(self.node, &self.scales, &content);
@@ -355,7 +360,7 @@ impl Check<'_> {
     }
 
     /// Reports heartbeat and guarding if both are on, for devices that accept only one of them.
-    fn excluded(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
+    fn excluded_service(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
         let is_on = |content: &Content| matches!(content, Content::Bytes(bytes) if bytes.iter().any(|byte| *byte != 0));
         if !is_on(&wanted.content) {
             return None;
@@ -363,26 +368,26 @@ impl Check<'_> {
         let others = &self.node.described(wanted.setting.object)?.only_if_zero;
         let mut others = self.settings.iter().filter(|setting| others.contains(&setting.object));
         others.find_map(|other| {
-            let content = self.resulting(other, file).filter(is_on)?;
+            let content = self.content_after(other, file).filter(is_on)?;
             let value = other.show(self.node, &self.scales, &content);
             Some(Problem::Excluded { other: other.key.clone(), value })
         })
     }
 
     /// Reports an identifier that two senders would share, or a TPDO without an identifier.
-    fn same_id(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
+    fn id_conflict(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
         // Without the device, the node-ID and the identifiers that depend on it are unknown.
         self.present?;
         let is_id = |setting: &&Setting| matches!(setting.form, Form::CobId(_));
         let is_on = |setting: &Setting| match setting.stage {
             Stage::Tpdo(number) => {
                 let enabled = self.find(&format!("tpdo.{}.enabled", number.get()));
-                let content = enabled.and_then(|enabled| self.resulting(enabled, file));
+                let content = enabled.and_then(|enabled| self.content_after(enabled, file));
                 content.is_none_or(|content| content == Content::Number(1))
             }
             _ => true,
         };
-        let id = |setting: &Setting| match self.resulting(setting, file) {
+        let id = |setting: &Setting| match self.content_after(setting, file) {
             Some(Content::Number(id)) => Some(id),
             _ => None,
         };

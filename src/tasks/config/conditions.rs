@@ -1,6 +1,6 @@
 //! Checks the conditions of `[device]`: the kind of device, its measuring range, relative or absolute pressure.
 
-use super::check::{FileSettings, number, range};
+use super::check::{FileSettings, parse_number, parse_range};
 use super::failure::ConfigFailure;
 use super::identity::Range;
 use super::snapshot::Snapshot;
@@ -37,7 +37,7 @@ pub(super) fn unmet<'a>(file: &'a FileSettings, snapshot: &Snapshot) -> Vec<(&'a
     let code = |number: Option<u32>| number.map(|number| Item::Text(format!("0x{number:X}")));
     let mut unmet = Vec::new();
     for entry in &file.conditions {
-        let same_number = |found: Option<u32>| found.is_some() && found == number(&entry.value);
+        let same_number = |found: Option<u32>| found.is_some() && found == parse_number(&entry.value);
         let same_text = |found: Option<Item>| (found.as_ref() == Some(&entry.value), found);
         let (is_met, found) = match entry.key.as_str() {
             "device.kind" => same_text(kind.name.clone().map(Item::Text)),
@@ -63,7 +63,7 @@ pub(super) fn unmet<'a>(file: &'a FileSettings, snapshot: &Snapshot) -> Vec<(&'a
 
 fn is_same_range(entry: &Entry, found: &Range) -> bool {
     let Item::Text(text) = &entry.value else { return false };
-    let Some((start, end, unit)) = range(text) else { return false };
+    let Some((start, end, unit)) = parse_range(text) else { return false };
     let present = found.unit.unwrap_or(Unit::NONE);
     let unit = unit.beside(present);
     let convert = |number: f64| if unit == present { Some(number) } else { unit.convert(number, present) };

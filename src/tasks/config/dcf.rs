@@ -201,7 +201,7 @@ impl Snapshot {
     }
 }
 
-/// If a COB-ID is the default for the node-ID of the DCF, returns the default for this node-ID.
+/// Adapts a COB-ID to this node-ID, if it is the default for the node-ID of the DCF.
 fn adapt_cob_id(word: u32, default: u16, id: NodeId, written_for: NodeId) -> u32 {
     let [default, id, other] = [u32::from(default), u32::from(id.get()), u32::from(written_for.get())];
     if default > id && word & 0x1fff_ffff == default - id + other { word & !0x1fff_ffff | default } else { word }

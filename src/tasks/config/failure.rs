@@ -116,7 +116,7 @@ pub enum ConfigFact {
 }
 
 impl ConfigFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             ConfigFailure::Mistake { .. } | ConfigFailure::NoSerial { .. } => Kind::Usage,

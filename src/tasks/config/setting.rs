@@ -96,7 +96,7 @@ pub enum Stage {
 }
 
 /// Objects of CiA 404 that belong to a channel: the index without its first digit, the name, and the stage.
-const CHANNEL: [(u16, &str, Stage); 20] = [
+const CHANNEL_OBJECTS: [(u16, &str, Stage); 20] = [
     (0x110, "sensor-type", Stage::Sensor),
     (0x112, "operating-mode", Stage::Sensor),
     (0x131, "unit", Stage::Unit),
@@ -120,7 +120,7 @@ const CHANNEL: [(u16, &str, Stage); 20] = [
 ];
 
 /// Objects of CiA 301 that a device without a description may have.
-const COMMUNICATION: [u16; 9] = [0x1005, 0x1006, 0x100c, 0x100d, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
+const COMMUNICATION_OBJECTS: [u16; 9] = [0x1005, 0x1006, 0x100c, 0x100d, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
 
 /// Returns the settings that a node can have, in the order of a file.
 pub fn settings(node: &Node) -> Vec<Setting> {
@@ -141,12 +141,12 @@ fn candidates(node: &Node) -> Vec<Entry> {
     if let Some(model) = node.model.as_ref().filter(|model| !model.dictionary.is_empty()) {
         return model.dictionary.iter().cloned().collect();
     }
-    let communication = COMMUNICATION.iter().map(|&index| ObjectId::new(index, 0));
+    let communication = COMMUNICATION_OBJECTS.iter().map(|&index| ObjectId::new(index, 0));
     let family = |signal: &Signal, low: u16| match low {
         0x110..=0x114 | 0x131 | 0x132 | 0x1a0 | 0x1a1 => ObjectId::new(0x6000 | low, signal.channel),
         _ => node.in_family(signal, low),
     };
-    let channel = node.signals.iter().flat_map(|signal| CHANNEL.map(|(low, ..)| family(signal, low)));
+    let channel = node.signals.iter().flat_map(|signal| CHANNEL_OBJECTS.map(|(low, ..)| family(signal, low)));
     let entry = |object: ObjectId| {
         standard::entry(object).or_else(|| {
             Some(Entry {
@@ -260,7 +260,7 @@ impl Catalog<'_> {
     /// another family contains the same setting.
     fn channel(&self, object: ObjectId) -> Option<(usize, &'static str, Stage)> {
         let low = object.index & 0x0fff;
-        let &(_, name, stage) = CHANNEL.iter().find(|(known, ..)| *known == low)?;
+        let &(_, name, stage) = CHANNEL_OBJECTS.iter().find(|(known, ..)| *known == low)?;
         let is_404 = self.node.identity.profile().is_none_or(|profile| profile == profiles::MEASURING);
         let signal = self.node.signals.iter().position(|signal| signal.channel == object.sub)?;
         if !is_404 || !(0x6000..0xa000).contains(&object.index) {
@@ -276,7 +276,8 @@ impl Catalog<'_> {
     fn is_in_other_family(&self, object: ObjectId) -> bool {
         let low = object.index & 0x0fff;
         let families = [0x6000, 0x7000, 0x8000, 0x9000];
-        let is_known = families.contains(&(object.index & 0xf000)) && CHANNEL.iter().any(|(known, ..)| *known == low);
+        let is_known =
+            families.contains(&(object.index & 0xf000)) && CHANNEL_OBJECTS.iter().any(|(known, ..)| *known == low);
         is_known && families.iter().any(|family| self.channel(ObjectId::new(family | low, object.sub)).is_some())
     }
 
@@ -328,8 +329,8 @@ impl Catalog<'_> {
         let channel = match section {
             2 | 5 => {
                 let low = setting.object.index & 0x0fff;
-                let order = CHANNEL.iter().position(|(known, ..)| *known == low).unwrap_or(0);
-                usize::from(setting.object.sub) * CHANNEL.len() + order
+                let order = CHANNEL_OBJECTS.iter().position(|(known, ..)| *known == low).unwrap_or(0);
+                usize::from(setting.object.sub) * CHANNEL_OBJECTS.len() + order
             }
             _ => 0,
         };

@@ -79,12 +79,12 @@ impl Snapshot {
         }
     }
 
-    /// The bit rate in bit/s, if it is known.
+    /// Returns the bit rate in bit/s, if it is known.
     pub fn bit_rate(&self) -> Option<u32> {
         self.bit_rate
     }
 
-    /// The settings of a TPDO.
+    /// Returns the settings of a TPDO.
     pub fn tpdo(&self, number: TpdoNumber) -> Option<&pdo::Settings> {
         self.tpdos.iter().find(|tpdo| tpdo.number == number)
     }
@@ -110,12 +110,12 @@ impl Snapshot {
         }
     }
 
-    /// The bytes of an object.
+    /// Returns the bytes of an object.
     pub fn bytes(&self, object: ObjectId) -> Option<&[u8]> {
         self.values.get(&object).map(Vec::as_slice)
     }
 
-    /// The value of a setting in the form of a file.
+    /// Returns the value of a setting in the form of a file.
     pub fn show(&self, setting: &Setting) -> Option<Item> {
         Some(setting.show(&self.node, &self.scales, &self.content(setting)?))
     }

@@ -134,26 +134,26 @@ impl Setting {
         match &self.form {
             Form::Plain => self.read_plain(node, item).map(Some),
             Form::Quantity(signal, scale) => self.read_quantity(scales.get(*signal), *scale, item),
-            Form::Hex => self.integer(number_of(item).ok_or_else(|| wrong("a number (0x180)"))?).map(Some),
+            Form::Hex => self.encode_integer(number_of(item).ok_or_else(|| wrong("a number (0x180)"))?).map(Some),
             Form::Duration(tick) => {
                 let Item::Text(text) = item else { return Err(wrong("a duration in quotes (\"100ms\")")) };
-                self.integer(parse_ticks(text, *tick)?).map(Some)
+                self.encode_integer(parse_ticks(text, *tick)?).map(Some)
             }
             Form::Unit(signal) => {
                 let Item::Text(text) = item else { return Err(wrong("a unit in quotes (\"bar\")")) };
                 let unit = Unit::from_symbol(text).filter(|_| !text.is_empty());
                 let unit = unit.ok_or_else(|| Problem::UnknownUnit { text: text.clone() })?;
                 let present = signal.and_then(|signal| node.signals.get(signal)?.unit);
-                self.integer(present.map_or(unit, |present| unit.beside(present)).0.into()).map(Some)
+                self.encode_integer(present.map_or(unit, |present| unit.beside(present)).0.into()).map(Some)
             }
             Form::Words(words) => self.read_word(words, item).map(Some),
-            Form::Transmission(timer) => self.integer(transmission(item, *timer)?.into()).map(Some),
-            Form::CobId(default) => cob_id(item, *default).map(|id| Some(Content::Number(id))),
+            Form::Transmission(timer) => self.encode_integer(parse_transmission(item, *timer)?.into()).map(Some),
+            Form::CobId(default) => parse_cob_id(item, *default).map(|id| Some(Content::Number(id))),
             Form::Bit(..) => match item {
                 Item::Flag(flag) => Ok(Some(Content::Number(u32::from(*flag)))),
                 _ => Err(wrong("true or false")),
             },
-            Form::Signals(_) => mapping(node, item).map(Some),
+            Form::Signals(_) => parse_mapping(node, item).map(Some),
             Form::NodeId => {
                 let number = number_of(item).ok_or_else(|| wrong("a node-ID (1 to 127)"))?;
                 let node = u8::try_from(number).ok().and_then(|number| NodeId::new(number).ok());
@@ -173,7 +173,9 @@ impl Setting {
         let text = match (self.data_type, item) {
             (DataType::Boolean, Item::Flag(flag)) => flag.to_string(),
             (DataType::Boolean, _) => return Err(wrong("true or false")),
-            (DataType::Unsigned(_) | DataType::Integer(_), Item::Integer(number)) => return self.integer(*number),
+            (DataType::Unsigned(_) | DataType::Integer(_), Item::Integer(number)) => {
+                return self.encode_integer(*number);
+            }
             (DataType::Unsigned(_) | DataType::Integer(_), Item::Text(text)) if text.starts_with("0x") => text.clone(),
             (DataType::Unsigned(_) | DataType::Integer(_), Item::Text(text)) => {
                 let word = names::word(node, self.object, self.data_type, text);
@@ -189,20 +191,20 @@ impl Setting {
         self.data_type.encode_text(&text).map(Content::Bytes).map_err(Problem::Value)
     }
 
-    fn integer(&self, number: i128) -> Result<Content, Problem> {
+    fn encode_integer(&self, number: i128) -> Result<Content, Problem> {
         self.data_type.encode_text(&number.to_string()).map(Content::Bytes).map_err(Problem::Value)
     }
 
     fn read_word(&self, words: &[(u64, String)], item: &Item) -> Result<Content, Problem> {
         match item {
             Item::Text(text) => match words.iter().find(|(_, word)| word == text) {
-                Some((code, _)) => self.integer((*code).into()),
+                Some((code, _)) => self.encode_integer((*code).into()),
                 None => {
                     let known = words.iter().map(|(_, word)| word.clone()).collect();
                     Err(Problem::Word { text: text.clone(), known })
                 }
             },
-            Item::Integer(number) => self.integer(*number),
+            Item::Integer(number) => self.encode_integer(*number),
             _ => Err(Problem::Type { expected: "a word in quotes", found: item.kind() }),
         }
     }
@@ -297,7 +299,7 @@ fn parse_ticks(text: &str, tick: u32) -> Result<i128, Problem> {
     i128::try_from(duration.as_nanos() / tick_nanos).map_err(|_| Problem::NotADuration { text: text.to_owned() })
 }
 
-fn transmission(item: &Item, timer: u8) -> Result<u8, Problem> {
+fn parse_transmission(item: &Item, timer: u8) -> Result<u8, Problem> {
     let wrong = || Problem::Transmission { text: item.to_string() };
     match item {
         Item::Integer(number) => u8::try_from(*number).map_err(|_| wrong()),
@@ -314,7 +316,7 @@ fn transmission(item: &Item, timer: u8) -> Result<u8, Problem> {
     }
 }
 
-fn cob_id(item: &Item, default: u16) -> Result<u32, Problem> {
+fn parse_cob_id(item: &Item, default: u16) -> Result<u32, Problem> {
     if *item == Item::Text("default".to_owned()) {
         return Ok(default.into());
     }
@@ -327,7 +329,7 @@ fn cob_id(item: &Item, default: u16) -> Result<u32, Problem> {
     }
 }
 
-fn mapping(node: &Node, item: &Item) -> Result<Content, Problem> {
+fn parse_mapping(node: &Node, item: &Item) -> Result<Content, Problem> {
     let list = match item {
         Item::List(list) => list.as_slice(),
         Item::Text(text) => std::slice::from_ref(text),

@@ -29,7 +29,7 @@ pub enum DetectFailure {
 }
 
 impl DetectFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             DetectFailure::NotFound { .. } => Kind::NoAnswer,

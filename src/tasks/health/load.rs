@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 /// The time over which the present load and the peak are measured.
-const WINDOW: Duration = Duration::from_secs(1);
+const LOAD_WINDOW: Duration = Duration::from_secs(1);
 
 /// Frames with a shorter pause between them belong to one burst. Receive times vary by about this time.
 const BURST_PAUSE: Duration = Duration::from_micros(50);
@@ -19,7 +19,7 @@ pub struct Load {
     start: Mono,
     end: Mono,
     bits: u64,
-    /// The frames of the last [`WINDOW`].
+    /// The frames of the last [`LOAD_WINDOW`].
     recent: VecDeque<(Mono, u64)>,
     recent_bits: u64,
     peak_bits: u64,
@@ -49,14 +49,14 @@ impl Load {
         self.recent_bits += bits;
         self.recent.push_back((at, bits));
         self.drop_old(at);
-        if at.since(self.start) >= WINDOW {
+        if at.since(self.start) >= LOAD_WINDOW {
             self.peak_bits = self.peak_bits.max(self.recent_bits);
         }
     }
 
     fn drop_old(&mut self, now: Mono) {
         while let Some(&(at, bits)) = self.recent.front() {
-            if now.since(at) < WINDOW {
+            if now.since(at) < LOAD_WINDOW {
                 return;
             }
             self.recent_bits -= bits;
@@ -86,19 +86,19 @@ impl Load {
         (!time.is_zero()).then(|| bits as f64 / (rate * time.as_secs_f64()))
     }
 
-    /// The mean load, 0 to 1. `None` if the bit rate is unknown.
+    /// Returns the mean load, 0 to 1. `None` if the bit rate is unknown.
     pub fn mean(&self) -> Option<f64> {
         self.share(self.bits, self.end.since(self.start))
     }
 
-    /// The load during the last second.
+    /// Returns the load during the last second.
     pub fn now(&self) -> Option<f64> {
-        if self.end.since(self.start) < WINDOW { self.mean() } else { self.share(self.recent_bits, WINDOW) }
+        if self.end.since(self.start) < LOAD_WINDOW { self.mean() } else { self.share(self.recent_bits, LOAD_WINDOW) }
     }
 
-    /// The load during the busiest second.
+    /// Returns the load during the busiest second.
     pub fn peak(&self) -> Option<f64> {
-        if self.end.since(self.start) < WINDOW { self.mean() } else { self.share(self.peak_bits, WINDOW) }
+        if self.end.since(self.start) < LOAD_WINDOW { self.mean() } else { self.share(self.peak_bits, LOAD_WINDOW) }
     }
 
     /// Returns the duration and the number of frames of the longest burst (frames without a pause). `None` if the bit
@@ -107,7 +107,7 @@ impl Load {
         self.bit_rate.map(|_| self.longest)
     }
 
-    /// The share of the bus that these bits took, 0 to 1.
+    /// Returns the bus load caused by these bits, 0 to 1.
     pub fn share_of(&self, bits: u64) -> Option<f64> {
         self.share(bits, self.end.since(self.start))
     }

@@ -23,27 +23,27 @@ impl Spread {
         self.sum += time;
     }
 
-    /// The number of times.
+    /// Returns the number of times.
     pub fn count(&self) -> u64 {
         self.histogram.count()
     }
 
-    /// The shortest time.
+    /// Returns the shortest time.
     pub fn min(&self) -> Option<Duration> {
         self.histogram.shortest()
     }
 
-    /// The longest time.
+    /// Returns the longest time.
     pub fn max(&self) -> Option<Duration> {
         self.histogram.longest()
     }
 
-    /// The mean.
+    /// Returns the mean.
     pub fn mean(&self) -> Option<Duration> {
         (self.count() > 0).then(|| self.sum.div_f64(self.count() as f64))
     }
 
-    /// The time that 99 % of all times do not exceed.
+    /// Returns the time that 99 % of all times do not exceed.
     pub fn p99(&self) -> Option<Duration> {
         self.histogram.quantile(0.99)
     }
@@ -122,7 +122,7 @@ impl NodeTally {
         self.overdue = since.filter(|&since| self.heartbeat.max().is_some_and(|longest| since > longest));
     }
 
-    /// The longest time without a heartbeat.
+    /// Returns the longest time without a heartbeat.
     pub fn longest_heartbeat(&self) -> Option<Duration> {
         self.overdue.or(self.heartbeat.max())
     }

@@ -128,7 +128,7 @@ pub enum LogFailure {
 }
 
 impl LogFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             LogFailure::UnknownSignal { .. }

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// A heartbeat is lost after two periods and this tolerance. The timers of devices are inaccurate.
-const TOLERANCE: Duration = Duration::from_millis(50);
+const HEARTBEAT_TOLERANCE: Duration = Duration::from_millis(50);
 
 /// The effect of a heartbeat or boot-up message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ impl HeartbeatMonitor {
     }
 
     /// Handles a heartbeat or boot-up message.
-    pub(super) fn take(&mut self, node: NodeId, life: Life, now: Mono) -> HeartbeatChange {
+    pub(super) fn on_life(&mut self, node: NodeId, life: Life, now: Mono) -> HeartbeatChange {
         let Some(heartbeat) = self.heartbeats.get_mut(&node) else { return HeartbeatChange::None };
         heartbeat.last = now;
         let was_lost = std::mem::take(&mut heartbeat.is_lost);
@@ -73,8 +73,9 @@ impl HeartbeatMonitor {
 
     /// Returns a node whose heartbeat has stopped, and the time since its last heartbeat. Each loss is returned once.
     pub(super) fn next_lost(&mut self, now: Mono) -> Option<(NodeId, Duration)> {
-        let is_late =
-            |heartbeat: &Heartbeat| !heartbeat.is_lost && now.since(heartbeat.last) > heartbeat.period * 2 + TOLERANCE;
+        let is_late = |heartbeat: &Heartbeat| {
+            !heartbeat.is_lost && now.since(heartbeat.last) > heartbeat.period * 2 + HEARTBEAT_TOLERANCE
+        };
         let (&node, heartbeat) = self.heartbeats.iter_mut().find(|(_, heartbeat)| is_late(heartbeat))?;
         heartbeat.is_lost = true;
         Some((node, now.since(heartbeat.last)))
@@ -102,14 +103,18 @@ mod tests {
         monitor.watch(&recorded, at(0));
         let operational = Life::State(NmtState::Operational);
         let stopped = Life::State(NmtState::Stopped);
-        assert_eq!(monitor.take(node, operational, at(100)), HeartbeatChange::None);
-        assert_eq!(monitor.take(node, stopped, at(200)), HeartbeatChange::State(NmtState::Stopped));
+        assert_eq!(monitor.on_life(node, operational, at(100)), HeartbeatChange::None);
+        assert_eq!(monitor.on_life(node, stopped, at(200)), HeartbeatChange::State(NmtState::Stopped));
         assert_eq!(monitor.next_lost(at(450)), None);
         assert_eq!(monitor.next_lost(at(451)), Some((node, Duration::from_millis(251))));
         assert_eq!(monitor.next_lost(at(600)), None, "returned once");
-        assert_eq!(monitor.take(node, operational, at(700)), HeartbeatChange::Back);
-        assert_eq!(monitor.take(node, Life::BootUp, at(750)), HeartbeatChange::None);
-        assert_eq!(monitor.take(node, operational, at(800)), HeartbeatChange::None, "no state before a boot-up counts");
+        assert_eq!(monitor.on_life(node, operational, at(700)), HeartbeatChange::Back);
+        assert_eq!(monitor.on_life(node, Life::BootUp, at(750)), HeartbeatChange::None);
+        assert_eq!(
+            monitor.on_life(node, operational, at(800)),
+            HeartbeatChange::None,
+            "no state before a boot-up counts"
+        );
         monitor.restart(at(9000));
         assert_eq!(monitor.next_lost(at(9250)), None);
     }

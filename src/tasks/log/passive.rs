@@ -51,7 +51,7 @@ impl SetupListener {
 
     /// Handles a frame. If the frame completes the setup of a TPDO, `decoder` decodes this TPDO from now on. Returns
     /// the recorded node if the frame contained information about the node.
-    pub(in crate::tasks) fn take(&mut self, received: &Received, decoder: &mut Decoder) -> Option<NodeId> {
+    pub(in crate::tasks) fn on_frame(&mut self, received: &Received, decoder: &mut Decoder) -> Option<NodeId> {
         let frame = &received.frame;
         if let Some((node, _)) = self.overheard.take(received).filter(|(node, _)| self.nodes.contains(node)) {
             self.update(node, decoder);

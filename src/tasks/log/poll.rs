@@ -1,6 +1,6 @@
 //! Polls by SDO: every signal of every node once per interval, all nodes in parallel.
 
-use super::nth;
+use super::multiply;
 use super::silence::Silent;
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
@@ -127,7 +127,7 @@ impl Poll {
 
     /// Returns when the next cycle starts. The first cycle starts at `start`.
     pub(super) fn due(&self, start: Mono) -> Mono {
-        start + nth(self.period, self.cycles)
+        start + multiply(self.period, self.cycles)
     }
 
     /// Returns the number of the next cycle.
@@ -183,7 +183,7 @@ impl Poll {
     }
 
     /// Handles an answer. Complete answers become a sample. Returns the first of several consecutive failures.
-    pub(super) fn answer(
+    pub(super) fn on_answer(
         &mut self,
         ticket: Ticket,
         result: Result<Answer, SdoError>,

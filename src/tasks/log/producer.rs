@@ -1,6 +1,6 @@
 //! The SYNC producer: sends SYNC without drift, and measures the delay of each SYNC. It also paces remote requests.
 
-use super::nth;
+use super::multiply;
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
@@ -57,7 +57,7 @@ impl Producer {
 
     /// Returns when the next SYNC is due. The time is computed from the start, so it does not drift.
     pub(super) fn due(&self) -> Mono {
-        self.start + nth(self.interval, self.slot)
+        self.start + multiply(self.interval, self.slot)
     }
 
     /// Returns the number of the next SYNC.
@@ -82,11 +82,11 @@ impl Producer {
             && let Some(slot) = self.waiting.take()
         {
             self.statistics.sent += 1;
-            self.statistics.delays.add(at.since(self.start + nth(self.interval, slot)));
+            self.statistics.delays.add(at.since(self.start + multiply(self.interval, slot)));
         }
     }
 
-    /// SYNC messages sent so far.
+    /// Returns the number of SYNC messages sent so far.
     pub(super) fn sent(&self) -> u64 {
         self.statistics.sent
     }
@@ -109,6 +109,6 @@ fn next_slot(start: Mono, now: Mono, interval: Duration, slot: u64) -> u64 {
     if passed <= slot {
         return slot + 1;
     }
-    let next = start + nth(interval, passed + 1);
+    let next = start + multiply(interval, passed + 1);
     if next.since(now) * 2 < interval { passed + 2 } else { passed + 1 }
 }

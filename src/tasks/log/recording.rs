@@ -171,17 +171,17 @@ impl<'o> Recording<'o> {
         }
     }
 
-    /// SYNC messages that this program sent.
+    /// Returns the number of SYNC messages that this program sent.
     pub(super) fn syncs(&self) -> u64 {
         self.tally.syncs.sent
     }
 
-    /// Values recorded so far.
+    /// Returns the number of values recorded so far.
     pub(super) fn rows(&self) -> u64 {
         self.tally.rows
     }
 
-    /// Values of a source recorded so far.
+    /// Returns the number of values of a source recorded so far.
     pub(super) fn count(&self, source: usize) -> u64 {
         self.tally.count(source)
     }
@@ -201,7 +201,7 @@ impl<'o> Recording<'o> {
         self.rereads.paused().any(|paused| paused == node)
     }
 
-    /// The time since the start of the recording.
+    /// Returns the time since the start of the recording.
     pub(super) fn waited(&self) -> Duration {
         self.tally.end().since(self.started)
     }
@@ -271,13 +271,18 @@ impl<'o> Recording<'o> {
     }
 
     /// Handles a frame.
-    fn frame(&mut self, received: &Received, master: &mut Master<'_>, observer: &mut dyn Observer) -> ControlFlow<()> {
+    fn on_frame(
+        &mut self,
+        received: &Received,
+        master: &mut Master<'_>,
+        observer: &mut dyn Observer,
+    ) -> ControlFlow<()> {
         self.tally.extend_to(received.at.mono);
         self.samples.clear();
-        self.due.frame(&received.frame);
+        self.due.on_frame(&received.frame);
         self.has_traffic = true;
         if let Some(listener) = &mut self.listener {
-            if let Some(node) = listener.take(received, &mut self.decoder) {
+            if let Some(node) = listener.on_frame(received, &mut self.decoder) {
                 let node = listener.known_node(node);
                 self.emergencies.learn(&node);
                 self.synced.set_up(&node);
@@ -286,14 +291,14 @@ impl<'o> Recording<'o> {
             }
             let second = self.listener.as_mut().and_then(SetupListener::next_second_answer);
             if let Some((node, object, answers)) = second {
-                self.second_answer(node, object, answers, received.at, observer)?;
+                self.on_second_answer(node, object, answers, received.at, observer)?;
             }
         }
         let decoded = self.decoder.decode(received, &mut self.samples);
         if matches!(decoded, Decoded::Tpdo(_) | Decoded::OtherFrame)
-            && let Some(surplus) = self.synced.take(&received.frame, received.at.mono)
+            && let Some(surplus) = self.synced.on_frame(&received.frame, received.at.mono)
         {
-            return self.surplus(surplus, received.at, observer);
+            return self.on_surplus(surplus, received.at, observer);
         }
         self.keep_early(&received.frame, decoded, received.at.mono, observer)?;
         match decoded {
@@ -302,19 +307,19 @@ impl<'o> Recording<'o> {
             }
             Decoded::Tpdo(_) => {
                 let samples = std::mem::take(&mut self.samples);
-                self.take_early(observer)?;
+                self.pass_early(observer)?;
                 self.samples = samples;
-                return self.take_samples(None, observer);
+                return self.pass_samples(None, observer);
             }
-            Decoded::Paused(node) => self.not_recorded(node, received.at.mono),
-            Decoded::WrongLength(node) => self.wrong_length(node, received.at, master, observer),
-            Decoded::OtherFrame => self.other_frame(received, master, observer),
+            Decoded::Paused(node) => self.on_paused_tpdo(node, received.at.mono),
+            Decoded::WrongLength(node) => self.on_wrong_length(node, received.at, master, observer),
+            Decoded::OtherFrame => self.on_other_frame(received, master, observer),
         }
         ControlFlow::Continue(())
     }
 
     /// Handles the result of an SDO transfer, which belongs to a reread, an inquiry or a poll.
-    fn answer(
+    fn on_answer(
         &mut self,
         ticket: Ticket,
         result: Result<Answer, SdoError>,
@@ -326,19 +331,19 @@ impl<'o> Recording<'o> {
             return Ok(ControlFlow::Continue(()));
         }
         if self.questions.open.as_ref().is_some_and(|open| open.has(ticket)) {
-            self.take_finding(ticket, &result, master, observer);
+            self.on_finding(ticket, &result, master, observer);
             return Ok(ControlFlow::Continue(()));
         }
         let Some(poll) = &mut self.poll else { return Ok(ControlFlow::Continue(())) };
         self.samples.clear();
         let cycle = poll.cycle_of(ticket);
-        if let Some(error) = poll.answer(ticket, result, &self.decoder, &mut self.samples) {
+        if let Some(error) = poll.on_answer(ticket, result, &self.decoder, &mut self.samples) {
             observer.event(&LogEvent::Remark(Remark::PollFailed(error.clone())), master.bus().now());
             if matches!(error.failure, SdoFailure::TwoDevices(Some(_))) {
                 return Ok(self.exclude(error.node, error.into()));
             }
         }
-        Ok(self.take_samples(cycle, observer))
+        Ok(self.pass_samples(cycle, observer))
     }
 
     /// If another node may send SYNC, keeps the first values until enough SYNC messages were received to detect a
@@ -356,26 +361,26 @@ impl<'o> Recording<'o> {
             self.early_until = Some(now + FOREIGN_SECOND_SENDER_TIMEOUT);
         } else if self.has_kept_early && self.early_until.is_some() && self.synced.is_decided() {
             let samples = std::mem::take(&mut self.samples);
-            self.take_early(observer)?;
+            self.pass_early(observer)?;
             self.samples = samples;
         }
         ControlFlow::Continue(())
     }
 
     /// Passes the values of the first SYNC to the observer.
-    fn take_early(&mut self, observer: &mut dyn Observer) -> ControlFlow<()> {
+    fn pass_early(&mut self, observer: &mut dyn Observer) -> ControlFlow<()> {
         if self.early_until.take().is_none() {
             return ControlFlow::Continue(());
         }
         for samples in std::mem::take(&mut self.early) {
             self.samples = samples;
-            self.take_samples(None, observer)?;
+            self.pass_samples(None, observer)?;
         }
         ControlFlow::Continue(())
     }
 
     /// Counts the samples and passes them to the observer. `cycle` is the cycle of their poll.
-    fn take_samples(&mut self, cycle: Option<u64>, observer: &mut dyn Observer) -> ControlFlow<()> {
+    fn pass_samples(&mut self, cycle: Option<u64>, observer: &mut dyn Observer) -> ControlFlow<()> {
         if let Some(count) = self.options.count {
             let left = usize::try_from(count - self.tally.rows).unwrap_or(usize::MAX);
             self.samples.truncate(left);
@@ -397,7 +402,7 @@ impl<'o> Recording<'o> {
         if let Some(gap) = self.tally.add(&self.samples, self.options.max_gap) {
             observer.event(&LogEvent::Gap(node, gap), at);
         }
-        if self.liveness.take_samples(node, at.mono) {
+        if self.liveness.on_samples(node, at.mono) {
             observer.event(&LogEvent::Back(node), at);
         }
         match cycle {

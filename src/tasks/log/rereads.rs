@@ -34,15 +34,15 @@ const WRONG_LENGTH_INTERVAL: Duration = Duration::from_secs(60);
 pub(super) enum RereadReason {
     /// The node restarted, or nothing could be received from it for a while. It may need a start command.
     Disconnected,
-    /// Its heartbeat paused, so a boot-up message may be lost. It may need a start command. A survey in progress goes
-    /// on: heartbeats of a busy device can pause more often than a survey takes.
+    /// The heartbeat of the node paused, so a boot-up message may be lost. It may need a start command. A survey in
+    /// progress goes on: heartbeats of a busy device can pause more often than a survey takes.
     HeartbeatPaused,
-    /// Another master wrote an object that its TPDOs depend on.
+    /// Another master wrote an object on which the TPDOs of the node depend.
     Written,
     /// The length of a TPDO differs from its mapping, so the TPDO was ignored. Other TPDOs are still recorded.
     WrongLength,
-    /// Frames were lost. A boot-up message or a write is rarely among them, so frames of the node are still recorded. If
-    /// the setup did change, the affected time is reported.
+    /// Frames were lost. The lost frames rarely contain a boot-up message or a write, so frames of the node are still
+    /// recorded. If the setup did change, the affected time is reported.
     FramesLost,
 }
 
@@ -133,7 +133,7 @@ impl Rereads {
         self.pending.contains_key(&node)
     }
 
-    /// When the next survey starts.
+    /// Returns when the next survey starts.
     pub(super) fn due(&self) -> Option<Mono> {
         self.pending.values().filter(|pending| pending.survey.is_none()).map(|pending| pending.due).min()
     }
@@ -154,7 +154,7 @@ impl Rereads {
     }
 
     /// Handles the result of a transfer. Returns a node that was read completely, or the first failure of a node.
-    pub(super) fn take(
+    pub(super) fn on_answer(
         &mut self,
         ticket: Ticket,
         result: &Result<Answer, SdoError>,

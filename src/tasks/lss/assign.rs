@@ -12,7 +12,7 @@ use super::objects::by_objects;
 use super::progress::{Progress, Stage};
 use super::resolve::resolve;
 use super::retime::{Retiming, needs_host_change};
-use super::services::{accepted_by_all, unchanged};
+use super::services::{accepted_by_all, with_nothing_changed};
 use super::session::{Session, in_required_state, is_silent, restore_state};
 use super::{Notify, Target, Via};
 use crate::canopen::id::NodeId;
@@ -78,7 +78,7 @@ pub struct Assigned {
 /// # Errors
 /// The cause, the completed steps, and the next step; bus errors and Ctrl-C.
 pub fn assign(master: &mut Master<'_>, job: &Job<'_>, notify: Notify<'_>) -> Result<Assigned, Failure> {
-    let (device, method, rate) = prepare(master, job, notify).map_err(unchanged)?;
+    let (device, method, rate) = prepare(master, job, notify).map_err(with_nothing_changed)?;
     let mut work = Work { job, device: &device, method, rate, progress: Progress::new(job.id, rate) };
     let mut result = work.carry_out(master, notify);
     if let Err(failure) = &result
@@ -232,7 +232,7 @@ impl Work<'_> {
     /// Adds the completed steps and the next step to a failure.
     fn explain(&self, mut failure: Failure) -> Failure {
         if self.progress.is_unchanged() {
-            return unchanged(failure);
+            return with_nothing_changed(failure);
         }
         let next = match (self.progress.stored, failure.kind()) {
             (Stage::NotDone, Kind::Refused) => NextStep::Cause,

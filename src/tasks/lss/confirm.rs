@@ -34,7 +34,7 @@ pub enum Confirmed {
 }
 
 impl Confirmed {
-    /// The word in JSON and tables.
+    /// Returns the word in JSON and tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Confirmed::BootUp => "boot-up",
@@ -48,8 +48,8 @@ impl Confirmed {
 /// the time until the boot-up message.
 ///
 /// # Errors
-/// The device does not come back, comes back unchanged, or shares its new node-ID with another device; bus errors and
-/// Ctrl-C.
+/// The device does not restart, restarts with its old node-ID, or shares its new node-ID with another device; bus
+/// errors and Ctrl-C.
 pub(super) fn confirm(
     master: &mut Master<'_>,
     device: &LssDevice,
@@ -62,7 +62,7 @@ pub(super) fn confirm(
     if let Some(old) = reset {
         master.send(NmtCommand::ResetNode.frame(Some(old)));
     }
-    let boot_time = if has_booted { Some(Duration::ZERO) } else { boot_up(master, new, start)? };
+    let boot_time = if has_booted { Some(Duration::ZERO) } else { wait_for_boot_up(master, new, start)? };
     let proof = if boot_time.is_some() { Confirmed::BootUp } else { Confirmed::Identity };
     let cause = match first_answer(master, new, boot_time.is_some())? {
         AnsweringDevices::Device(found) if device.address.is_none_or(|address| address == found) => {
@@ -81,7 +81,7 @@ pub(super) fn confirm(
     Err(Failure::at(new, LssFailure { device: name, cause }))
 }
 
-fn boot_up(master: &mut Master<'_>, new: NodeId, start: Mono) -> Result<Option<Duration>, Error> {
+fn wait_for_boot_up(master: &mut Master<'_>, new: NodeId, start: Mono) -> Result<Option<Duration>, Error> {
     let until = start + BOOT_TIMEOUT.max(master.timing().timeout);
     let booted = wait(master, until, Policy::Command, |_, event| match event {
         Happening::Frame(received) if Life::parse(&received.frame) == Some((new, Life::BootUp)) => {

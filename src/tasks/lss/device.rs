@@ -62,17 +62,17 @@ impl LssDevice {
         }
     }
 
-    /// The name for messages.
+    /// Returns the name for messages.
     pub(super) fn name(&self) -> DeviceName {
         DeviceName { node: self.node, address: self.address }
     }
 
-    /// The node-ID, if a message to it reaches only this device.
+    /// Returns the node-ID, if a message to this node-ID reaches only this device.
     pub(super) fn own_node(&self) -> Option<NodeId> {
         self.node.filter(|_| self.is_alone)
     }
 
-    /// The description of the device.
+    /// Returns the description of the device.
     pub(super) fn description(&self) -> Option<&Description> {
         self.model.as_ref().map(|model| &model.description)
     }

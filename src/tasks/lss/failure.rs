@@ -195,12 +195,12 @@ pub enum NextStep {
 }
 
 impl LssFailure {
-    /// A failure that does not belong to a single device.
+    /// Creates a failure that does not belong to a single device.
     pub fn general(cause: LssCause) -> LssFailure {
         LssFailure { device: DeviceName::default(), cause }
     }
 
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match &self.cause {
             LssCause::Service(error) => lss_kind(error),

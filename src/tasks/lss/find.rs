@@ -68,7 +68,7 @@ pub fn scan(master: &mut Master<'_>, times: SearchTimes, notify: Notify<'_>) -> 
     master.listen(&Filters::All)?;
     let mut lss = master.lss();
     let unconfigured = match lss.is_anyone_unconfigured(asked, times.first) {
-        Ok(true) => unconfigured(&mut lss, times.further, notify),
+        Ok(true) => find_unconfigured(&mut lss, times.further, notify),
         Ok(false) => Ok(Vec::new()),
         Err(error) => Err(error),
     };
@@ -83,7 +83,7 @@ pub fn scan(master: &mut Master<'_>, times: SearchTimes, notify: Notify<'_>) -> 
 }
 
 /// Finds devices without a node-ID, until no further device answers.
-fn unconfigured(
+fn find_unconfigured(
     lss: &mut Lss<'_, '_>,
     further: Option<Duration>,
     notify: Notify<'_>,

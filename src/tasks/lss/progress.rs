@@ -19,7 +19,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// The stage after an LSS service with this result.
+    /// Returns the stage after an LSS service with this result.
     pub(super) fn after(result: &Result<(), LssError>) -> Stage {
         match result {
             Ok(()) => Stage::Done,
@@ -48,7 +48,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// The progress before the first step.
+    /// Creates the progress before the first step.
     pub(super) fn new(id: Option<NodeId>, rate: Option<PlannedRate>) -> Progress {
         Progress {
             id: id.map(|id| (id, Stage::NotDone)),

@@ -28,7 +28,7 @@ pub(super) fn resolve(
         Target::Node(node) => by_node_id(master, *node, descriptions, via),
         Target::Address(address) => by_address(master, *address, descriptions, notify),
         Target::Only => only_device(master, descriptions, force, notify),
-        Target::Unconfigured => unconfigured(master, descriptions),
+        Target::Unconfigured => find_unconfigured(master, descriptions),
     }
 }
 
@@ -93,7 +93,7 @@ fn by_address(
     Ok(device)
 }
 
-fn unconfigured(master: &mut Master<'_>, descriptions: &Descriptions<'_>) -> Result<LssDevice, Failure> {
+fn find_unconfigured(master: &mut Master<'_>, descriptions: &Descriptions<'_>) -> Result<LssDevice, Failure> {
     let mut lss = master.lss();
     let found = lss.fastscan();
     let leave_result = lss.leave();

@@ -74,7 +74,7 @@ pub fn store(
     force: bool,
     notify: Notify<'_>,
 ) -> Result<(), Failure> {
-    let device = resolve(master, target, descriptions, (Via::Lss, force), notify).map_err(unchanged)?;
+    let device = resolve(master, target, descriptions, (Via::Lss, force), notify).map_err(with_nothing_changed)?;
     with_device(master, &device, notify, |lss| accepted_by_all(lss.store(), force))
 }
 
@@ -98,7 +98,7 @@ pub fn activate(
         sent?;
         return Ok(leave_result?);
     };
-    let device = resolve(master, target, descriptions, (Via::Lss, force), notify).map_err(unchanged)?;
+    let device = resolve(master, target, descriptions, (Via::Lss, force), notify).map_err(with_nothing_changed)?;
     with_device(master, &device, notify, |lss| lss.activate(delay_ms))
 }
 
@@ -118,12 +118,12 @@ fn with_device<T>(
 }
 
 /// Adds to a failure that nothing was changed.
-pub(super) fn unchanged(mut failure: Failure) -> Failure {
+pub(super) fn with_nothing_changed(mut failure: Failure) -> Failure {
     failure.effects.push(Effect::NothingChanged);
     failure
 }
 
-/// With `force`, several answers that accept the request are a success.
+/// Treats several answers that all accept the request as a success, if `force` is set.
 pub(super) fn accepted_by_all(result: Result<(), LssError>, force: bool) -> Result<(), LssError> {
     match result {
         Err(LssError::Several { frames, .. })

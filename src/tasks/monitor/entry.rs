@@ -58,7 +58,7 @@ impl FrameKind {
         FrameKind::Other,
     ];
 
-    /// The word on the command line and in the output.
+    /// Returns the word on the command line and in the output.
     pub fn as_str(self) -> &'static str {
         match self {
             FrameKind::Nmt => "nmt",

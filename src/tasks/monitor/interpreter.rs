@@ -119,7 +119,7 @@ impl Interpreter {
     pub fn take(&mut self, received: &Received, entries: &mut Vec<Entry>) -> FrameKind {
         self.last_fault = None;
         let frame = &received.frame;
-        if let Some(node) = self.setup.take(received, &mut self.decoder) {
+        if let Some(node) = self.setup.on_frame(received, &mut self.decoder) {
             self.learn(node);
         }
         let part = self.transfers.take(received);

@@ -29,7 +29,7 @@ pub enum NmtFailure {
 }
 
 impl NmtFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             NmtFailure::OtherState { .. } => Kind::Unexpected,

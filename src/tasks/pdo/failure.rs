@@ -186,7 +186,7 @@ pub enum StepError {
 }
 
 impl StepError {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             StepError::Rejected(_) => Kind::Refused,
@@ -198,7 +198,7 @@ impl StepError {
         }
     }
 
-    /// The object of the failed step, if any.
+    /// Returns the object of the failed step, if any.
     pub fn object(&self) -> Option<ObjectId> {
         match self {
             StepError::Rejected(error) | StepError::Lost(error) => Some(error.object),
@@ -207,7 +207,7 @@ impl StepError {
         }
     }
 
-    /// The abort code, if the device rejected the request.
+    /// Returns the abort code, if the device rejected the request.
     pub fn abort(&self) -> Option<AbortCode> {
         match self {
             StepError::Rejected(SdoError { failure: SdoFailure::Refused(code), .. }) => Some(*code),
@@ -337,7 +337,7 @@ pub enum PdoFact {
 }
 
 impl PdoFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             PdoFailure::NoTpdo | PdoFailure::Restarted | PdoFailure::Multiplexed { .. } => Kind::Unexpected,
@@ -355,7 +355,7 @@ impl PdoFailure {
         }
     }
 
-    /// The abort code, if the device rejected a request.
+    /// Returns the abort code, if the device rejected a request.
     pub fn abort(&self) -> Option<AbortCode> {
         match self {
             PdoFailure::Rejected { error, .. } => StepError::from((**error).clone()).abort(),
@@ -373,7 +373,7 @@ impl PdoFact {
 }
 
 /// Converts the error of a read of TPDO settings to a failure.
-pub(super) fn not_read(node: NodeId, available: Vec<TpdoNumber>, error: StepError) -> Failure {
+pub(super) fn read_failure(node: NodeId, available: Vec<TpdoNumber>, error: StepError) -> Failure {
     match error {
         StepError::Rejected(error) => {
             let object = error.object;

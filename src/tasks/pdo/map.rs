@@ -1,13 +1,13 @@
 //! Sets the mapping and the parameters of a TPDO as a transaction.
 
 use super::change::Change;
-use super::failure::{PdoEffect, PdoFact, PdoFailure, StepWrite, not_read};
+use super::failure::{PdoEffect, PdoFact, PdoFailure, StepWrite, read_failure};
 use super::identifiers;
 use super::plan;
 use super::request::PdoRequest;
 use super::session::Session;
 use super::settings::Settings;
-use super::show::{TpdoReport, may_have_inhibit_time, numbers};
+use super::show::{TpdoReport, may_have_inhibit_time, tpdo_numbers};
 use super::state_switch::StateSwitch;
 use crate::canopen::pdo::TpdoNumber;
 use crate::device::catalog::Model;
@@ -54,7 +54,7 @@ pub fn map(
     let (mapping, mut notes) = request.mapping(&mut session)?;
     let has_inhibit = request.inhibit_100us.is_some() || may_have_inhibit_time(&node, number);
     let old = Settings::read(&mut session, number, has_inhibit);
-    let old = old.map_err(|error| not_read(node.id, numbers(&node), error))?;
+    let old = old.map_err(|error| read_failure(node.id, tpdo_numbers(&node), error))?;
     if old.multiplexed && mapping.is_some() {
         return Err(Failure::at(node.id, PdoFailure::Multiplexed { number }));
     }
@@ -104,7 +104,7 @@ pub(in crate::tasks) struct Changed {
 /// The node rejects a read or does not answer; bus errors and Ctrl-C.
 pub(in crate::tasks) fn read(master: &mut Master<'_>, node: &Node, number: TpdoNumber) -> Result<Settings, Failure> {
     let settings = Settings::read(&mut Session::new(master, node), number, may_have_inhibit_time(node, number));
-    settings.map_err(|error| not_read(node.id, numbers(node), error))
+    settings.map_err(|error| read_failure(node.id, tpdo_numbers(node), error))
 }
 
 /// Changes the settings of a TPDO of a known node as a transaction: see [`map()`].

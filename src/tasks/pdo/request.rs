@@ -17,7 +17,7 @@ use crate::tasks::{Failure, Note};
 use std::str::FromStr;
 
 /// The transmission type for the event timer, unless the description states another type.
-const TIMER: u8 = 254;
+const TIMER_TRANSMISSION: u8 = 254;
 
 /// The data bits of a classic CAN frame.
 const MAX_BITS: u32 = 64;
@@ -131,7 +131,7 @@ impl PdoRequest {
             let timer = node.model.as_ref().and_then(|model| model.description.pdo.timer);
             wanted.transmission = match trigger {
                 Trigger::Code(code) => code,
-                Trigger::Timer => timer.unwrap_or(TIMER),
+                Trigger::Timer => timer.unwrap_or(TIMER_TRANSMISSION),
             };
         }
         let missing = |parameter: Parameter| {

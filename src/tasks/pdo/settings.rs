@@ -33,7 +33,8 @@ impl Settings {
     /// Reads all settings; the inhibit time only if `inhibit` is true.
     ///
     /// # Errors
-    /// Any error except a missing event timer or inhibit time, because settings can be restored only if all are known.
+    /// Any error except a missing event timer or inhibit time. The settings can be restored only if all of them are
+    /// known.
     pub(super) fn read(
         session: &mut Session<'_, '_>,
         number: TpdoNumber,

@@ -1,6 +1,6 @@
 //! Shows the settings of TPDOs with their signals.
 
-use super::failure::{PdoFailure, not_read};
+use super::failure::{PdoFailure, read_failure};
 use super::session::Session;
 use super::settings::Settings;
 use crate::canopen::id::NodeId;
@@ -41,7 +41,7 @@ impl TpdoReport {
         TpdoReport { node: node.id, settings, items }
     }
 
-    /// The inhibit time; `None` if the device has none.
+    /// Returns the inhibit time; `None` if the device has none.
     pub fn inhibit(&self) -> Option<Duration> {
         self.settings.inhibit_100us.map(|inhibit| Duration::from_micros(100) * u32::from(inhibit))
     }
@@ -66,7 +66,7 @@ pub(super) fn may_have_inhibit_time(node: &Node, number: TpdoNumber) -> bool {
 }
 
 /// Returns the numbers of the node's TPDOs.
-pub(super) fn numbers(node: &Node) -> Vec<TpdoNumber> {
+pub(super) fn tpdo_numbers(node: &Node) -> Vec<TpdoNumber> {
     node.tpdos.iter().map(|tpdo| tpdo.number).collect()
 }
 
@@ -81,7 +81,7 @@ pub fn show(
     overrides: &Overrides,
 ) -> Result<Vec<TpdoReport>, Failure> {
     let node = open(master, node, overrides)?;
-    let available = numbers(&node);
+    let available = tpdo_numbers(&node);
     let wanted = number.map_or_else(|| available.clone(), |number| vec![number]);
     if wanted.is_empty() {
         return Err(Failure::at(node.id, PdoFailure::NoTpdo));
@@ -89,7 +89,7 @@ pub fn show(
     let mut session = Session { accepts_silence: true, ..Session::new(master, &node) };
     let read = |number| {
         let settings = Settings::read(&mut session, number, may_have_inhibit_time(&node, number));
-        let settings = settings.map_err(|error| not_read(node.id, available.clone(), error))?;
+        let settings = settings.map_err(|error| read_failure(node.id, available.clone(), error))?;
         Ok(TpdoReport::new(&node, settings))
     };
     wanted.into_iter().map(read).collect()

@@ -212,7 +212,7 @@ impl<'a> Watcher<'a> {
     fn on_frame(&mut self, received: &Received, master: &mut Master<'_>) -> ControlFlow<()> {
         let at = received.at;
         if let Some(setup) = &mut self.setup {
-            if let Some(node) = setup.take(received, &mut self.decoder) {
+            if let Some(node) = setup.on_frame(received, &mut self.decoder) {
                 let node = setup.known_node(node);
                 self.set_up(&node);
             } else if let Some((node, Life::BootUp)) = Life::parse(&received.frame) {
@@ -229,7 +229,7 @@ impl<'a> Watcher<'a> {
         self.samples.clear();
         let decoded = self.decoder.decode(received, &mut self.samples);
         if matches!(decoded, Decoded::Tpdo(_) | Decoded::OtherFrame)
-            && let Some(surplus) = self.synced.take(&received.frame, at.mono)
+            && let Some(surplus) = self.synced.on_frame(&received.frame, at.mono)
         {
             return self.on_surplus(surplus);
         }

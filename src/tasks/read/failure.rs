@@ -52,7 +52,7 @@ pub enum ReadFailure {
 }
 
 impl ReadFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             ReadFailure::NoMeasuredValue | ReadFailure::Invalid { .. } => Kind::Unexpected,

@@ -12,7 +12,7 @@ pub enum ScanFailure {
 }
 
 impl ScanFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             ScanFailure::NoAnswer | ScanFailure::NoFrame => Kind::NoAnswer,

@@ -73,10 +73,10 @@ pub struct PastError {
 /// # Errors
 /// No answer; [`SettingsFailure::NoErrorObjects`].
 pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Errors, Failure> {
-    read_by(values, master, node)
+    read_by(read_optional, master, node)
 }
 
-/// Reads values of a node: [`values`], or [`read_each`], which fails without an answer.
+/// Reads values of a node: [`read_optional`], or [`read_each`], which fails without an answer.
 type ReadValues = fn(&mut Master<'_>, &Node, &[ObjectId]) -> Result<Vec<Option<Value>>, Failure>;
 
 fn read_by(values: ReadValues, master: &mut Master<'_>, node: &Node) -> Result<Errors, Failure> {
@@ -106,14 +106,14 @@ fn read_by(values: ReadValues, master: &mut Master<'_>, node: &Node) -> Result<E
 }
 
 /// Reads the values of optional objects. Objects without a valid answer are recorded as unknown.
-fn values(master: &mut Master<'_>, node: &Node, objects: &[ObjectId]) -> Result<Vec<Option<Value>>, Failure> {
+fn read_optional(master: &mut Master<'_>, node: &Node, objects: &[ObjectId]) -> Result<Vec<Option<Value>>, Failure> {
     let items: Vec<_> = objects.iter().map(|&object| (node.id, object, node.data_type(object))).collect();
     Ok(Reader::new(master).values(&items)?)
 }
 
 fn counters(master: &mut Master<'_>, node: &Node) -> Result<Vec<ErrorCounter>, Failure> {
     let objects = node.model.as_ref().map_or(&[][..], |model| &model.description.error_counters);
-    let values = values(master, node, objects)?;
+    let values = read_optional(master, node, objects)?;
     let counter = |(&object, value): (&ObjectId, &Option<Value>)| ErrorCounter {
         object,
         name: node.name_of(object),

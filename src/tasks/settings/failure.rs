@@ -216,7 +216,7 @@ pub enum SettingsFact {
 }
 
 impl SettingsFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             SettingsFailure::WhichSignal { .. }

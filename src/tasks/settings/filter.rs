@@ -70,7 +70,7 @@ impl FilterType {
         }
     }
 
-    /// The first word of its meaning in descriptions, and the value of `--type`.
+    /// Returns the first word of the meaning of this type in descriptions, which is also the value of `--type`.
     pub fn word(self) -> &'static str {
         match self {
             FilterType::None => "none",

@@ -138,10 +138,10 @@ const STORE: ObjectId = ObjectId::new(0x1010, 0);
 const HEARTBEAT: ObjectId = ObjectId::new(0x1017, 0);
 
 /// The communication objects on the page. Identity, TPDOs and errors have their own sections.
-const COMMUNICATION: [u16; 9] = [0x1005, 0x1006, 0x100c, 0x100d, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
+const COMMUNICATION_OBJECTS: [u16; 9] = [0x1005, 0x1006, 0x100c, 0x100d, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
 
 /// The scaling objects of a channel, as indices without the first digit. Every family has them.
-const SCALING: [u16; 5] = [0x120, 0x121, 0x122, 0x123, 0x124];
+const SCALING_OBJECTS: [u16; 5] = [0x120, 0x121, 0x122, 0x123, 0x124];
 
 /// If the heartbeat time is longer, the state is not shown, because the page should appear at once.
 const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(2);
@@ -244,7 +244,7 @@ pub fn read(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Res
 fn communication(node: &Node) -> Vec<ObjectId> {
     let startup =
         node.model.as_ref().and_then(|model| model.description.startup.as_ref()).map(|startup| startup.object);
-    let mut objects: Vec<ObjectId> = COMMUNICATION.into_iter().map(|index| ObjectId::new(index, 0)).collect();
+    let mut objects: Vec<ObjectId> = COMMUNICATION_OBJECTS.into_iter().map(|index| ObjectId::new(index, 0)).collect();
     objects.extend(startup.filter(|object| !objects.contains(object)));
     objects.retain(|&object| node.may_have(object));
     objects
@@ -259,7 +259,7 @@ fn channel_objects(node: &Node, signal: &Signal) -> Vec<ObjectId> {
     let described = node.model.as_ref().is_some_and(|model| !model.dictionary.is_empty());
     let own = signal.value_object.0.index & 0xf000;
     let scaling = [0x6000, 0x7000, 0x8000, 0x9000].into_iter().filter(|&family| described || family == own);
-    let scaling = SCALING.into_iter().flat_map(|low| scaling.clone().map(move |family| at(family | low)));
+    let scaling = SCALING_OBJECTS.into_iter().flat_map(|low| scaling.clone().map(move |family| at(family | low)));
     let mut objects: Vec<ObjectId> = [0x6110, 0x6112, 0x6114].map(at).to_vec();
     objects.extend(scaling);
     objects.extend([0x6126, 0x6127, 0x6132, 0x61a0, 0x61a1].map(at));

@@ -124,7 +124,7 @@ fn quantity(signal: &Signal, value: &Value) -> Option<ValueWithUnit> {
     Some(ValueWithUnit { number, unit: signal.unit })
 }
 
-/// Like [`quantity`], but `None` if `object` is the process value and contains the overload marker.
+/// Does the same as [`quantity`], but returns `None` if `object` is the process value and contains the overload marker.
 fn measured_quantity(node: &Node, signal: &Signal, object: ObjectId, value: &Value) -> Option<ValueWithUnit> {
     let is_marker = signal.has_marker && signal.is_value(object) && is_smallest(value, node.data_type(object));
     quantity(signal, value).filter(|_| !is_marker)

@@ -23,7 +23,7 @@ pub(super) fn is_own(object: ObjectId) -> bool {
 }
 
 /// The objects in the unit of a signal, as indices without the first digit.
-const IN_UNIT: [u16; 9] = [0x121, 0x123, 0x124, 0x133, 0x134, 0x135, 0x136, 0x148, 0x149];
+const OBJECTS_IN_UNIT: [u16; 9] = [0x121, 0x123, 0x124, 0x133, 0x134, 0x135, 0x136, 0x148, 0x149];
 
 /// Returns the meaning of a value.
 pub(super) fn meaning(
@@ -66,7 +66,7 @@ pub(super) fn meaning(
 
 fn is_in_unit(node: &Node, signal: &Signal, object: ObjectId) -> bool {
     let standard = object.index >= 0x6000 && object.sub == signal.channel;
-    let standard = standard && (IN_UNIT.contains(&(object.index & 0x0fff)) || object.index == 0x6127);
+    let standard = standard && (OBJECTS_IN_UNIT.contains(&(object.index & 0x0fff)) || object.index == 0x6127);
     let described = node.described(object).is_some_and(|entry| entry.follows_unit == Some(signal.channel));
     let named = ["minimum-pv", "maximum-pv"].iter().any(|name| node.object_of(signal, name) == Some(object));
     standard || described || named

@@ -81,7 +81,7 @@ impl Scale {
 }
 
 /// The objects of CiA 404 in the unit of 6131h, as indices without the first digit.
-const IN_UNIT: [(u16, Scale); 10] = [
+const OBJECTS_IN_UNIT: [(u16, Scale); 10] = [
     (0x121, Scale::Point),
     (0x123, Scale::Point),
     (0x148, Scale::Point),
@@ -128,7 +128,7 @@ fn unit_of(node: &Node, signal: &Signal) -> Option<UnitOf> {
 /// The device does not accept the unit (according to its description or its answer), does not answer, or keeps another
 /// unit.
 pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit: Unit) -> Result<UnitChange, Failure> {
-    let signal = choose(node, signal, unit)?.clone();
+    let signal = choose_signal(node, signal, unit)?.clone();
     let Some(old) = unit_of(node, &signal) else {
         return Err(Failure::at(node.id, SettingsFailure::NoUnit { signal: Some(signal.name) }));
     };
@@ -143,7 +143,7 @@ pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit:
     let addresses: Vec<ObjectId> = objects.iter().map(|&(object, _)| object).collect();
     let before = read_each(master, node, &addresses)?;
     set_object(master, node, object, &unit.0.to_le_bytes())?;
-    let renewed = Signal { unit: Some(unit), digits: digits(master, node, &signal)?, ..signal.clone() };
+    let renewed = Signal { unit: Some(unit), digits: read_digits(master, node, &signal)?, ..signal.clone() };
     let after = read_each(master, node, &addresses)?;
     let mut rescaled = Vec::new();
     for (&(object, scale), (before, after)) in objects.iter().zip(before.iter().zip(&after)) {
@@ -183,7 +183,7 @@ fn check_accepted(node: &Node, signal: &Signal, old: &UnitOf, unit: Unit) -> Res
 }
 
 /// Reads the decimal digits again, because they may change with the unit.
-fn digits(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Option<u8>, Failure> {
+fn read_digits(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Option<u8>, Failure> {
     let [_, object] = unit_and_digits(node, signal);
     let value = match object.filter(|&object| node.may_have(object)) {
         Some(object) => read_each(master, node, &[object])?.pop().flatten(),
@@ -204,7 +204,7 @@ pub fn is_alike(signal: &Signal, unit: Unit) -> bool {
 }
 
 /// Returns the signal with this name; without a name, the only signal with a unit of the same quantity.
-fn choose<'a>(node: &'a Node, name: Option<&str>, unit: Unit) -> Result<&'a Signal, Failure> {
+fn choose_signal<'a>(node: &'a Node, name: Option<&str>, unit: Unit) -> Result<&'a Signal, Failure> {
     let mut alike = node.signals.iter().filter(|signal| is_alike(signal, unit));
     match (name, alike.next(), alike.next()) {
         (Some(name), ..) => find(node, name),
@@ -220,7 +220,7 @@ pub(in crate::tasks) fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, 
     // Without a description, only the family of the process value is read.
     let own = signal.value_object.0.index & 0xf000;
     let families = [0x6000, 0x7000, 0x8000, 0x9000].into_iter().filter(|&family| has_description || family == own);
-    let in_unit = IN_UNIT.into_iter().filter(|_| signal.has_channel());
+    let in_unit = OBJECTS_IN_UNIT.into_iter().filter(|_| signal.has_channel());
     let standard = in_unit.flat_map(move |(low, scale)| {
         families.clone().map(move |family| (ObjectId::new(family | low, channel), scale))
     });

@@ -48,7 +48,7 @@ pub struct Difference {
 }
 
 impl StoreFailure {
-    /// The kind, which decides the exit code.
+    /// Returns the kind of the failure, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
             StoreFailure::NotOnCommand { .. }
@@ -58,7 +58,7 @@ impl StoreFailure {
         }
     }
 
-    /// The abort code, if the device rejected a request.
+    /// Returns the abort code, if the device rejected a request.
     pub fn abort(&self) -> Option<AbortCode> {
         match self {
             StoreFailure::NoGroup { code, .. } | StoreFailure::CapabilityUnreadable { code, .. } => Some(*code),

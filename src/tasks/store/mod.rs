@@ -35,7 +35,7 @@ pub enum StoreCommand {
 }
 
 impl StoreCommand {
-    /// The object for the command of a group: 1010h or 1011h.
+    /// Returns the object for the command of a group: 1010h or 1011h.
     pub fn object(self, group: Group) -> ObjectId {
         let index = match self {
             StoreCommand::Store => 0x1010,
@@ -44,7 +44,7 @@ impl StoreCommand {
         ObjectId::new(index, group.sub())
     }
 
-    /// The signature for the object.
+    /// Returns the signature that is written to the object.
     pub fn signature(self) -> &'static str {
         match self {
             StoreCommand::Store => "save",
@@ -79,7 +79,7 @@ impl Group {
         groups.iter().map(|group| group.as_str()).collect::<Vec<_>>().join("+")
     }
 
-    /// The sub-index of 1010h and 1011h.
+    /// Returns the sub-index of 1010h and 1011h.
     fn sub(self) -> u8 {
         match self {
             Group::All => 1,

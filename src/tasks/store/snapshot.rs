@@ -13,9 +13,9 @@ use crate::tasks::note::StateEffect;
 use crate::tasks::{Effect, Fact, Failure, Note};
 
 /// Settings of CiA 301 and CiA 404, which are read if the description does not list the stored settings.
-const COMMUNICATION: [u16; 11] =
+const COMMUNICATION_OBJECTS: [u16; 11] =
     [0x1005, 0x1006, 0x1007, 0x100c, 0x100d, 0x1012, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
-const APPLICATION: [u16; 14] =
+const APPLICATION_OBJECTS: [u16; 14] =
     [0x6110, 0x6112, 0x6114, 0x6124, 0x6126, 0x6127, 0x6131, 0x6132, 0x6133, 0x6134, 0x6135, 0x6136, 0x61a0, 0x61a1];
 /// The number of TPDOs and channels that are read in this case.
 const MAX_NUMBER: u8 = 4;
@@ -34,7 +34,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// The value; the bytes if they do not fit the type.
+    /// Returns the value, or the bytes if they do not fit the type.
     pub fn value(&self) -> Value {
         let value = self.data_type.and_then(|data_type| data_type.decode(&self.bytes).ok());
         value.unwrap_or_else(|| Value::Bytes(self.bytes.clone()))
@@ -61,7 +61,7 @@ pub(in crate::tasks) fn objects(device: &Node, groups: &[Group]) -> Vec<ObjectId
     }
     let mut objects = Vec::new();
     if is_included("comm") {
-        objects.extend(COMMUNICATION.map(|index| ObjectId::new(index, 0)));
+        objects.extend(COMMUNICATION_OBJECTS.map(|index| ObjectId::new(index, 0)));
         for number in 0..u16::from(MAX_NUMBER) {
             objects.extend([1, 2, 3, 5].map(|sub| ObjectId::new(0x1800 + number, sub)));
             objects.extend((0..=8).map(|sub| ObjectId::new(0x1a00 + number, sub)));
@@ -69,7 +69,7 @@ pub(in crate::tasks) fn objects(device: &Node, groups: &[Group]) -> Vec<ObjectId
     }
     if is_included("app") {
         let channels = |index: u16| (1..=MAX_NUMBER).map(move |channel| ObjectId::new(index, channel));
-        objects.extend(APPLICATION.into_iter().flat_map(channels));
+        objects.extend(APPLICATION_OBJECTS.into_iter().flat_map(channels));
     }
     objects
 }

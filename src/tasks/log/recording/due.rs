@@ -51,14 +51,14 @@ impl DueTpdos {
     }
 
     /// Starts a cycle with the SYNC sent at `at`, and ends the previous cycle.
-    pub(super) fn sync(&mut self, at: Mono) {
+    pub(super) fn on_sync(&mut self, at: Mono) {
         if self.last.replace(at).is_some() {
             self.end_cycle();
         }
     }
 
     /// Handles a frame.
-    pub(super) fn frame(&mut self, frame: &Frame) {
+    pub(super) fn on_frame(&mut self, frame: &Frame) {
         if let Some(due) = self.tpdos.get_mut(&frame.id()).filter(|_| !frame.is_remote()) {
             due.current += 1;
         }
@@ -94,9 +94,9 @@ mod tests {
         let due = DueTpdo { every, values: 2, ..DueTpdo::default() };
         let mut tpdos = DueTpdos { tpdos: BTreeMap::from([(CanId::Standard(0x181), due)]), last: None };
         for cycle in 0..6 {
-            tpdos.sync(at(cycle * 100));
+            tpdos.on_sync(at(cycle * 100));
             if received.contains(&cycle) {
-                tpdos.frame(&"181#00".parse().expect("a frame"));
+                tpdos.on_frame(&"181#00".parse().expect("a frame"));
             }
         }
         tpdos.missing(at(end), Duration::from_millis(100))

@@ -47,7 +47,7 @@ impl Recording<'_> {
     }
 
     /// Adopts the overloads that the nodes reported before the recording.
-    pub(in crate::tasks::log) fn take_overloads(&mut self) {
+    pub(in crate::tasks::log) fn adopt_overloads(&mut self) {
         self.nodes.iter().for_each(|node| self.decoder.set_overload(node.id, node.has_overload));
     }
 
@@ -69,15 +69,15 @@ impl Recording<'_> {
     }
 
     /// Handles a frame that is not a TPDO.
-    pub(super) fn other_frame(&mut self, received: &Received, master: &mut Master<'_>, observer: &mut dyn Observer) {
+    pub(super) fn on_other_frame(&mut self, received: &Received, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let (frame, at) = (&received.frame, received.at);
         if let Some((node, emergency)) = self.emergencies.parse(frame) {
-            self.emergency(node, emergency, at, observer);
+            self.on_emergency(node, emergency, at, observer);
         } else if let Some((node, life)) = Life::parse(frame) {
             if let Some((node, length)) = Life::unusual_length(frame) {
                 self.wrong_heartbeat_length(node, length, at, observer);
             }
-            self.life(node, life, at, master, observer);
+            self.on_life(node, life, at, master, observer);
         } else if let Some((node, length)) = Life::unusual_length(frame) {
             self.wrong_heartbeat_length(node, length, at, observer);
         } else if let Some(node) = node_with_written_setup(frame, &self.nodes) {
@@ -121,7 +121,7 @@ impl Recording<'_> {
         }
     }
 
-    fn emergency(&mut self, node: NodeId, emergency: Emergency, at: Stamp, observer: &mut dyn Observer) {
+    fn on_emergency(&mut self, node: NodeId, emergency: Emergency, at: Stamp, observer: &mut dyn Observer) {
         match self.emergencies.overload(node, emergency) {
             Some(OverloadChange::Begins(channel)) => self.decoder.begin_overload(node, channel),
             Some(OverloadChange::Ends) => self.decoder.end_overload(node),
@@ -159,7 +159,7 @@ impl Recording<'_> {
     }
 
     /// Handles a heartbeat or boot-up message.
-    fn life(&mut self, node: NodeId, life: Life, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
+    fn on_life(&mut self, node: NodeId, life: Life, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let is_boot_up = life == Life::BootUp;
         if is_boot_up {
             self.decoder.end_overload(node);
@@ -182,7 +182,7 @@ impl Recording<'_> {
         if !self.liveness.has(node) {
             return;
         }
-        match self.liveness.take_life(node, life, at.mono) {
+        match self.liveness.on_life(node, life, at.mono) {
             HeartbeatChange::None => {}
             HeartbeatChange::Back => {
                 observer.event(&LogEvent::HeartbeatBack(node), at);
@@ -193,11 +193,11 @@ impl Recording<'_> {
             HeartbeatChange::State(state) => observer.event(&LogEvent::State(node, state), at),
         }
         if is_boot_up && !is_first_message {
-            self.restarted(node, at, master, observer);
+            self.on_restart(node, at, master, observer);
         }
     }
 
-    fn restarted(&mut self, node: NodeId, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
+    fn on_restart(&mut self, node: NodeId, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
         self.tally.events.restarts += 1;
         observer.event(&LogEvent::Restarted(node), at);
         self.request_reread(node, RereadReason::Disconnected, at.mono, master);
@@ -213,7 +213,7 @@ impl Recording<'_> {
         let at = master.bus().now();
         for &node in nodes {
             if self.liveness.has(node) {
-                self.restarted(node, at, master, observer);
+                self.on_restart(node, at, master, observer);
             }
         }
     }
@@ -246,7 +246,7 @@ impl Recording<'_> {
     }
 
     /// Handles frames that the kernel dropped.
-    pub(super) fn dropped(&mut self, count: u32, master: &mut Master<'_>, observer: &mut dyn Observer) {
+    pub(super) fn on_dropped(&mut self, count: u32, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let at = master.bus().now();
         self.tally.dropped += u64::from(count);
         self.synced.on_lost_frames();
@@ -255,13 +255,13 @@ impl Recording<'_> {
     }
 
     /// Counts a TPDO of a node whose setup is uncertain.
-    pub(super) fn not_recorded(&mut self, node: NodeId, now: Mono) {
+    pub(super) fn on_paused_tpdo(&mut self, node: NodeId, now: Mono) {
         self.tally.events.not_recorded += 1;
         self.liveness.restart(node, now);
     }
 
     /// Handles a TPDO that arrived more than once per SYNC. If the values differ, the TPDO is ignored from now on.
-    pub(super) fn surplus(&mut self, surplus: Surplus, at: Stamp, observer: &mut dyn Observer) -> ControlFlow<()> {
+    pub(super) fn on_surplus(&mut self, surplus: Surplus, at: Stamp, observer: &mut dyn Observer) -> ControlFlow<()> {
         let Surplus { node, number, differs, is_new } = surplus;
         if !is_new {
             return ControlFlow::Continue(());
@@ -276,7 +276,7 @@ impl Recording<'_> {
 
     /// Handles two answers to one request of another master. If their difference makes the setup uncertain, the TPDOs
     /// of the node are ignored from now on.
-    pub(super) fn second_answer(
+    pub(super) fn on_second_answer(
         &mut self,
         node: NodeId,
         object: ObjectId,
@@ -310,7 +310,7 @@ impl Recording<'_> {
     }
 
     /// Handles a TPDO whose length differs from its mapping.
-    pub(super) fn wrong_length(
+    pub(super) fn on_wrong_length(
         &mut self,
         node: NodeId,
         at: Stamp,
@@ -337,9 +337,9 @@ impl Recording<'_> {
         master: &mut Master<'_>,
         observer: &mut dyn Observer,
     ) -> Result<(), Error> {
-        match self.rereads.take(ticket, result, master) {
+        match self.rereads.on_answer(ticket, result, master) {
             None => Ok(()),
-            Some(Ok(reread)) => self.update(reread, master, observer),
+            Some(Ok(reread)) => self.apply_reread(reread, master, observer),
             Some(Err((node, error))) => {
                 observer.event(&LogEvent::Unreadable(node, Box::new(error.into())), master.bus().now());
                 Ok(())
@@ -348,7 +348,12 @@ impl Recording<'_> {
     }
 
     /// Continues the recording with the new setup of a node.
-    fn update(&mut self, reread: Reread, master: &mut Master<'_>, observer: &mut dyn Observer) -> Result<(), Error> {
+    fn apply_reread(
+        &mut self,
+        reread: Reread,
+        master: &mut Master<'_>,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Error> {
         let Reread { node, may_need_start, recorded_since } = reread;
         let (id, at) = (node.id, master.bus().now());
         let Some(place) = self.nodes.iter().position(|known| known.id == id) else { return Ok(()) };
@@ -398,7 +403,7 @@ impl Recording<'_> {
     }
 
     /// Handles an answer of a silent node. After the last answer, the reasons are reported.
-    pub(super) fn take_finding(
+    pub(super) fn on_finding(
         &mut self,
         ticket: Ticket,
         result: &Result<Answer, SdoError>,
@@ -415,7 +420,7 @@ impl Recording<'_> {
     }
 
     /// Handles a fault of the controller.
-    pub(super) fn fault(&mut self, fault: Fault, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
+    pub(super) fn on_fault(&mut self, fault: Fault, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
         if self.faults.is_new(fault, |&other| other == fault, at.mono) {
             observer.event(&LogEvent::Fault(fault), at);
         }
@@ -428,7 +433,7 @@ impl Recording<'_> {
     }
 
     /// Handles a change of the link: the interface went down or came back.
-    pub(super) fn link(&mut self, up: bool, master: &mut Master<'_>, observer: &mut dyn Observer) {
+    pub(super) fn on_link(&mut self, up: bool, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let at = master.bus().now();
         self.link_is_up = up;
         observer.event(&LogEvent::Link(up), at);

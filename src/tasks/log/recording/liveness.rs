@@ -59,15 +59,15 @@ impl Liveness {
     }
 
     /// Handles samples of a node. Returns whether the node was reported as silent.
-    pub(super) fn take_samples(&mut self, node: NodeId, at: Mono) -> bool {
+    pub(super) fn on_samples(&mut self, node: NodeId, at: Mono) -> bool {
         let liveness = self.nodes.entry(node).or_default();
         liveness.samples.add(at, None);
         std::mem::take(&mut liveness.is_silent)
     }
 
     /// Handles a heartbeat or boot-up message.
-    pub(super) fn take_life(&mut self, node: NodeId, life: Life, at: Mono) -> HeartbeatChange {
-        self.heartbeats.take(node, life, at)
+    pub(super) fn on_life(&mut self, node: NodeId, life: Life, at: Mono) -> HeartbeatChange {
+        self.heartbeats.on_life(node, life, at)
     }
 
     /// Measures the silence of a node from now on, because nothing could be recorded until now.
@@ -155,10 +155,10 @@ mod tests {
         });
         let mut liveness = Liveness::new([id].into_iter());
         liveness.watch_heartbeat(&node, Mode::AsSent, at(0));
-        liveness.take_samples(id, at(100));
-        liveness.take_samples(id, at(200));
+        liveness.on_samples(id, at(100));
+        liveness.on_samples(id, at(200));
         for second in 1..10 {
-            liveness.take_life(id, Life::State(state), at(second * 1000));
+            liveness.on_life(id, Life::State(state), at(second * 1000));
         }
         while liveness.next_lost_heartbeat(at(end)).is_some() {}
         !liveness.lost(at(end)).is_empty()

@@ -7,7 +7,7 @@ use crate::canopen::id::CanId;
 use crate::master::{Error, Happening, Master};
 use crate::node::wait::{self, Policy, Until, Waiter};
 use crate::tasks::log::producer::Producer;
-use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, LogEvent, Mode, Observer, TICK};
+use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, LogEvent, Mode, Observer, TICK_INTERVAL};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -38,7 +38,7 @@ impl Schedule {
             start,
             end: duration.map(|duration| start + duration),
             give_up: start + duration.unwrap_or(timeout).min(timeout),
-            next_tick: start + TICK,
+            next_tick: start + TICK_INTERVAL,
             interrupted_at: None,
         }
     }
@@ -91,7 +91,7 @@ impl Recording<'_> {
         let mut recorder = Loop { recording: self, schedule, producer: producer.as_mut(), observer };
         let result = wait::run(master, Policy::Record, &mut recorder);
         // The result is not needed: the recording ends here even if the reader has not closed the output.
-        let _ = self.take_early(observer);
+        let _ = self.pass_early(observer);
         self.timestamps = master.bus().timestamps();
         if let Some(producer) = producer {
             self.tally.syncs = producer.finish(master);
@@ -119,7 +119,7 @@ impl Recording<'_> {
     }
 
     /// Carries out the work that is due at `now`.
-    fn deadline(
+    fn on_deadline(
         &mut self,
         now: Mono,
         schedule: &mut Schedule,
@@ -133,7 +133,7 @@ impl Recording<'_> {
         }
         self.tally.extend_to(now);
         if self.early_until.is_some_and(|until| now >= until) {
-            self.take_early(observer)?;
+            self.pass_early(observer)?;
         }
         if schedule.is_over(now, self.tally.rows) {
             return ControlFlow::Break(());
@@ -146,7 +146,7 @@ impl Recording<'_> {
                 return ControlFlow::Continue(());
             }
             observer.cycle(producer.slot(), master.bus().now())?;
-            self.due.sync(now);
+            self.due.on_sync(now);
             let is_free = !master.is_sending();
             if let Mode::Sync(interval) = self.options.mode {
                 if producer.slot() == 0 {
@@ -172,7 +172,7 @@ impl Recording<'_> {
         if now < schedule.next_tick {
             return ControlFlow::Continue(());
         }
-        schedule.next_tick = now + TICK;
+        schedule.next_tick = now + TICK_INTERVAL;
         self.examine_silent_nodes(now.since(schedule.start), master);
         self.report_repeated(master.bus().now(), false, observer);
         observer.tick(master.bus().now(), self.tally.rows)
@@ -200,7 +200,7 @@ impl Recording<'_> {
 
     /// Handles Ctrl-C. After the first Ctrl-C, frames received earlier are still recorded. The second Ctrl-C ends the
     /// recording immediately.
-    fn interrupt(&mut self, schedule: &mut Schedule, master: &Master<'_>) -> Result<ControlFlow<()>, Error> {
+    fn on_interrupt(&mut self, schedule: &mut Schedule, master: &Master<'_>) -> Result<ControlFlow<()>, Error> {
         let is_second = std::mem::replace(&mut self.interrupted, true);
         if self.tally.rows == 0 && self.early.is_empty() {
             return Err(Error::Interrupted);
@@ -239,18 +239,18 @@ impl Waiter for Loop<'_, '_> {
         }
         let Loop { recording, schedule, producer, observer } = self;
         match event {
-            Happening::Frame(received) => return Ok(recording.frame(&received, master, *observer)),
-            Happening::Sdo(ticket, result) => return recording.answer(ticket, result, master, *observer),
+            Happening::Frame(received) => return Ok(recording.on_frame(&received, master, *observer)),
+            Happening::Sdo(ticket, result) => return recording.on_answer(ticket, result, master, *observer),
             Happening::Deadline => {
                 // Nothing has changed since `until` returned this moment.
                 let now = recording.next_deadline(schedule, producer.as_deref());
-                return Ok(recording.deadline(now, schedule, producer.as_deref_mut(), master, *observer));
+                return Ok(recording.on_deadline(now, schedule, producer.as_deref_mut(), master, *observer));
             }
-            Happening::Interrupted => return recording.interrupt(schedule, master),
+            Happening::Interrupted => return recording.on_interrupt(schedule, master),
             Happening::Ended => return Ok(ControlFlow::Break(())),
-            Happening::Fault(fault, at) => recording.fault(fault, at, master, *observer),
-            Happening::Dropped(count) => recording.dropped(count, master, *observer),
-            Happening::Link(up) => recording.link(up, master, *observer),
+            Happening::Fault(fault, at) => recording.on_fault(fault, at, master, *observer),
+            Happening::Dropped(count) => recording.on_dropped(count, master, *observer),
+            Happening::Link(up) => recording.on_link(up, master, *observer),
         }
         Ok(ControlFlow::Continue(()))
     }

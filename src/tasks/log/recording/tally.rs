@@ -77,7 +77,7 @@ impl Tally {
         gap
     }
 
-    /// The number of values of a source.
+    /// Returns the number of values of a source.
     pub(super) fn count(&self, source: usize) -> u64 {
         self.statistics.get(source).map_or(0, Statistics::count)
     }
@@ -92,18 +92,18 @@ impl Tally {
         self.end = at;
     }
 
-    /// The end of the recording.
+    /// Returns the end of the recording.
     pub(super) fn end(&self) -> Mono {
         self.end
     }
 
-    /// Time between the first row and the end.
+    /// Returns the time between the first row and the end.
     pub(super) fn length(&self) -> Duration {
         self.first.map_or(Duration::ZERO, |first| self.end.since(first))
     }
 
-    /// The statistics of each source. A source without samples is omitted if its signal has a later source, because its
-    /// unit was unknown at first.
+    /// Returns the statistics of each source. A source without samples is omitted if its signal has a later source,
+    /// because its unit was unknown at first.
     pub(super) fn into_statistics(self, sources: &[Source]) -> Vec<(Source, Statistics)> {
         let is_replaced = |at: usize| sources[at + 1..].iter().any(|later| is_same_signal(later, &sources[at]));
         let counted = self.statistics.into_iter().zip(sources).enumerate();
