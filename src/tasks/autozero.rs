@@ -35,9 +35,9 @@ use samples::Samples;
 /// The value to set to zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ZeroTarget {
-    /// The process value, by the offset.
+    /// The process value, which is shifted by the offset.
     Autozero,
-    /// The net value (x140h), by the tare zero (x138h).
+    /// The net value (x140h), which is shifted by the tare zero (x138h).
     Tare,
 }
 
@@ -60,7 +60,7 @@ pub struct Options {
     pub channel: Option<u8>,
     /// The largest reading that is accepted as zero.
     pub limit: Limit,
-    /// The number of readings before the signature, and again after it.
+    /// The number of readings before the signature is written, and also after it.
     pub samples: u32,
     /// Whether the safety checks are skipped.
     pub force: bool,

@@ -1,4 +1,4 @@
-//! Reads the contents for a first description of an unknown device: identity, readable objects, signals.
+//! Reads an unknown device for a first version of its description: identity, readable objects, signals.
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;

@@ -29,7 +29,7 @@ use std::time::Duration;
 /// The shortest interval between two reads of one node.
 const READ_INTERVAL: Duration = Duration::from_millis(100);
 
-/// The share of the bus that the reads may take.
+/// The bus load (0 to 1) that the reads may cause.
 const READ_SHARE: f64 = 0.05;
 
 /// The length of a request and its answer in bits.

@@ -11,7 +11,7 @@ pub enum HostAction {
     Up {
         /// Its name.
         interface: String,
-        /// The bit rate in bit/s; `None` keeps the present one.
+        /// The bit rate in bit/s; `None` keeps the present bit rate.
         bit_rate: Option<u32>,
         /// Whether to set listen-only mode.
         listen_only: bool,

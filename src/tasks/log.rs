@@ -190,7 +190,7 @@ pub struct RecordingReport {
     /// Nodes whose setup could not be read, and which were not recorded. In a passive recording: requested signals that
     /// were not recorded.
     pub failed: Vec<Failure>,
-    /// Nodes with a TPDO that two devices send. From then on, these TPDOs were ignored.
+    /// Nodes with a TPDO that two devices send. After the detection, these TPDOs were ignored.
     pub two_devices: Vec<Failure>,
     /// Nodes that were replaced by other devices.
     pub replaced: Vec<Failure>,
@@ -204,7 +204,7 @@ pub struct RecordingReport {
     pub emergencies: u64,
     /// Intervals longer than [`LogOptions::max_gap`].
     pub gaps: u64,
-    /// Polls that were not sent because the previous one was not finished.
+    /// Polls that were not sent because the previous poll was not finished.
     pub skipped: u64,
     /// Other events.
     pub events: EventCounts,
@@ -285,7 +285,7 @@ pub fn log(
     Ok(RecordingReport { failed, ..restore_states(recording, master, result)? })
 }
 
-/// Reads the setup of the nodes. Returns the nodes, and the failures of the others.
+/// Reads the setup of the nodes. Returns the nodes, and the failures of the other nodes.
 fn survey(
     master: &mut Master<'_>,
     options: &LogOptions,

@@ -22,11 +22,11 @@ use std::time::Duration;
 /// What is shown, and for how long.
 #[derive(Clone, Debug, Default)]
 pub struct MonitorOptions {
-    /// The nodes to show, besides messages that do not belong to one node; empty for all nodes.
+    /// The nodes to show; empty for all nodes. Messages that do not belong to one node are also shown.
     pub nodes: BTreeSet<NodeId>,
     /// The kinds of messages to show; empty for all.
     pub kinds: BTreeSet<FrameKind>,
-    /// Whether repetitions are shown: heartbeats without a change, and error frames that repeat the last one.
+    /// Whether repetitions are shown: heartbeats without a change, and error frames that repeat the last error frame.
     pub all: bool,
     /// The monitor ends after this time.
     pub duration: Option<Duration>,
@@ -69,8 +69,8 @@ pub fn identify(master: &mut Master<'_>) -> Result<Overrides, Failure> {
     Ok(NodeId::all().filter_map(|node| Some((node, overheard.recognise(node)?))).collect())
 }
 
-/// Shows the traffic until the time or the number of messages is reached, the recording ends, Ctrl-C, or `on_entry`
-/// breaks.
+/// Shows the traffic until the time or the number of messages is reached, the recording ends, the user presses Ctrl-C,
+/// or `on_entry` breaks.
 ///
 /// # Errors
 /// Bus errors.

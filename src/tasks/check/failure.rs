@@ -13,7 +13,7 @@ pub enum CheckFailure {
         /// The number of all verdicts.
         all: usize,
     },
-    /// No source states the type of an object that an expression needs.
+    /// The type of an object in an expression is unknown.
     UnknownType {
         /// The object as entered by the user.
         signal: String,

@@ -37,7 +37,7 @@ pub struct Options {
     pub exact: bool,
     /// Whether the device stores the settings.
     pub store: bool,
-    /// Whether the device is then reset and read again.
+    /// Whether the device is reset and read again after the store.
     pub reset: bool,
     /// The words that the user typed after the node: the file and the options.
     pub arguments: String,
@@ -48,7 +48,7 @@ pub struct Options {
 pub struct Row {
     /// The path in a file.
     pub key: String,
-    /// The value before.
+    /// The value before the change.
     pub before: Option<Item>,
     /// The present value; after a failure, the written value.
     pub after: Option<Item>,

@@ -92,7 +92,7 @@ fn compare(
 /// Checks a file against the description of its device. Needs no bus.
 ///
 /// # Errors
-/// Every mistake.
+/// All mistakes in the file.
 pub fn check_offline(document: &Document, node: &Node) -> Result<(), Vec<super::Mistake>> {
     let mut catalog = settings(node);
     catalog.extend(super::check::named_objects(document, node, &catalog));

@@ -41,7 +41,7 @@ pub enum ConfigFailure {
         /// Whether the values were read back after a reset.
         is_after_reset: bool,
     },
-    /// The bit rate is not changed while other nodes are on the bus.
+    /// Another node uses the new node-ID, or other nodes prevent a change of the bit rate.
     OthersOnBus {
         /// The other nodes.
         nodes: Vec<NodeId>,
@@ -68,11 +68,11 @@ pub enum ConfigFailure {
         /// The reason.
         reason: String,
     },
-    /// Nothing to roll back.
+    /// The journal contains nothing to roll back.
     NoJournal,
 }
 
-/// The changes that remain after a failed application of settings.
+/// The changes that remain if settings could not be applied completely.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConfigEffect {
     /// The settings that were written.

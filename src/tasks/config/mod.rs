@@ -1,7 +1,7 @@
 //! Dumps, compares and applies all settings of a device.
 //!
-//! One table ([`setting`]) has every setting with its key, object, form of values and stage. [`Snapshot`] reads the
-//! settings; [`crate::device::config_file::Document`] is a file.
+//! One table ([`setting`]) contains every setting with its key, object, form of values and stage. [`Snapshot`] reads
+//! the settings; [`crate::device::config_file::Document`] is a file.
 
 mod apply;
 mod arrivals;

@@ -44,7 +44,7 @@ pub enum Problem {
         /// The type in the file.
         found: &'static str,
     },
-    /// Not a duration with its unit.
+    /// The text is not a duration with a unit.
     NotADuration {
         /// The text.
         text: String,
@@ -54,19 +54,19 @@ pub enum Problem {
         /// The step in microseconds.
         tick: u32,
     },
-    /// Not a unit.
+    /// The text is not a unit.
     UnknownUnit {
         /// The text.
         text: String,
     },
-    /// Not a number with a unit.
+    /// The text is not a number with a unit.
     NotAQuantity {
         /// The text.
         text: String,
     },
-    /// A number without a unit, and the file sets no unit for the signal.
+    /// The number has no unit, and the file sets no unit for the signal.
     NoUnit,
-    /// Units of different quantities.
+    /// The units belong to different quantities.
     OtherQuantity {
         /// The unit in the file.
         from: Unit,
@@ -92,19 +92,19 @@ pub enum Problem {
         /// The values.
         values: Vec<String>,
     },
-    /// Not an allowed word.
+    /// The text is not an allowed word.
     Word {
         /// The text.
         text: String,
         /// The words.
         known: Vec<String>,
     },
-    /// Not a transmission type.
+    /// The text is not a transmission type.
     Transmission {
         /// The text.
         text: String,
     },
-    /// Not an identifier.
+    /// The text is not an identifier.
     NotACobId {
         /// The text.
         text: String,
@@ -123,7 +123,7 @@ pub enum Problem {
     },
     /// A TPDO that is switched on needs an identifier.
     NoId,
-    /// Not a bit rate.
+    /// The text is not a bit rate.
     NotABitRate {
         /// The text.
         text: String,

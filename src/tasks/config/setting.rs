@@ -22,7 +22,7 @@ pub struct Setting {
     pub object: ObjectId,
     /// The type of the object.
     pub data_type: DataType,
-    /// How its values are written.
+    /// How the values are written in a file.
     pub form: Form,
     /// The stage in which the setting is written.
     pub stage: Stage,
@@ -30,7 +30,7 @@ pub struct Setting {
     pub is_writable: bool,
 }
 
-/// How the values of a setting are written.
+/// How the values of a setting are written in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
     /// As a value of the type of the object.
@@ -39,9 +39,9 @@ pub enum Form {
     Hex,
     /// A duration; the step of the object is this many microseconds.
     Duration(u32),
-    /// A unit: `"bar"`, of the signal with this number.
+    /// The unit (`"bar"`) of the signal with this index; `None` if it belongs to no signal.
     Unit(Option<usize>),
-    /// A number in the unit of the signal with this number.
+    /// A number in the unit of the signal with this index.
     Quantity(usize, Scale),
     /// A word, if the number has one.
     Words(Vec<(u64, String)>),

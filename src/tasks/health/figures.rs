@@ -6,7 +6,7 @@ use crate::tasks::monitor::FrameKind;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// The limit for the mean load. Messages with a low priority wait long above it.
+/// The limit for the mean load. Above this load, messages with a low priority wait long.
 const LOAD_LIMIT: f64 = 60.0;
 
 /// The limit for the load in one second.

@@ -68,7 +68,7 @@ pub struct NodeTally {
     pub answers: Spread,
     /// SDO reads without an answer.
     pub unanswered: u64,
-    /// Emergencies, without the messages that an error is over.
+    /// Emergencies, except messages that an error is over.
     pub emergencies: u64,
     /// The code and the meaning of the last emergency.
     pub last_emergency: Option<(u16, String)>,

@@ -149,7 +149,7 @@ impl Poll {
         u64::try_from(cycles).unwrap_or(u64::MAX)
     }
 
-    /// Starts the cycles that are due. Returns how many polls were skipped because the previous one was not finished.
+    /// Starts the cycles that are due. Returns how many polls were skipped because the previous poll was not finished.
     pub(super) fn start_due(&mut self, start: Mono, now: Mono, master: &mut Master<'_>) -> u64 {
         let cycles = self.cycles_until(start, now);
         let cycle = self.cycles;
@@ -182,7 +182,8 @@ impl Poll {
         skipped
     }
 
-    /// Handles an answer. Complete answers become a sample. Returns the first of several consecutive failures.
+    /// Handles an answer. If all answers for a target were received, adds a sample. Of several consecutive failures,
+    /// only the first is returned.
     pub(super) fn on_answer(
         &mut self,
         ticket: Ticket,

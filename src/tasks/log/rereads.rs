@@ -35,7 +35,7 @@ pub(super) enum RereadReason {
     /// The node restarted, or nothing could be received from it for a while. It may need a start command.
     Disconnected,
     /// The heartbeat of the node paused, so a boot-up message may be lost. It may need a start command. A survey in
-    /// progress goes on: heartbeats of a busy device can pause more often than a survey takes.
+    /// progress continues: the heartbeats of a busy device can pause again before a survey is complete.
     HeartbeatPaused,
     /// Another master wrote an object on which the TPDOs of the node depend.
     Written,
@@ -48,7 +48,7 @@ pub(super) enum RereadReason {
 
 /// A node to be read again.
 struct Pending {
-    /// When to start.
+    /// When the read starts.
     due: Mono,
     survey: Option<BackgroundSurvey>,
     /// Whether the node may need a start command.

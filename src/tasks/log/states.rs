@@ -37,8 +37,7 @@ pub(super) struct NmtStates {
 impl NmtStates {
     /// Starts the nodes that are not known to be operational. Adds nodes that restart during this time to `restarted`.
     ///
-    /// If another NMT master was seen, it starts only nodes that the user wants to start explicitly, and returns a
-    /// remark.
+    /// If another NMT master was seen, it starts nodes only with `start_all`. Otherwise, it returns a remark.
     pub(super) fn start(
         &mut self,
         master: &mut Master<'_>,

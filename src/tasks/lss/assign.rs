@@ -34,7 +34,7 @@ pub struct Job<'a> {
     pub id: Option<NodeId>,
     /// The new bit rate.
     pub rate: Option<RequestedRate>,
-    /// Whether to store both in non-volatile memory.
+    /// Whether to store node-ID and bit rate in non-volatile memory.
     pub store: bool,
     /// Whether the host changes to the new bit rate together with the device.
     pub retime: bool,

@@ -48,8 +48,8 @@ impl SearchTimes {
     }
 }
 
-/// Lists the devices with a node-ID (by SDO) and those without (by fastscan). A device found by fastscan stays in
-/// configuration state while the next one is searched. Nothing is changed.
+/// Lists the devices with a node-ID (by SDO) and without a node-ID (by fastscan). A device found by fastscan stays in
+/// configuration state while the next device is searched. Nothing is changed.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C; the first fastscan failed. The failure of a later fastscan is an event. Without a device, the

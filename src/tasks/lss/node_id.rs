@@ -209,7 +209,7 @@ pub(super) fn find_taken_sign(
     Ok(waited.done())
 }
 
-/// Reads the device type twice, until the first answer or sign of life.
+/// Reads the device type twice, until the first answer, heartbeat or boot-up message.
 fn ask_twice(master: &mut Master<'_>, node: NodeId, timeout: Duration) -> Result<(), Failure> {
     // One request or its answer may be lost.
     let start = master.now();

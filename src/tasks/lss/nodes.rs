@@ -10,7 +10,7 @@ use crate::tasks::Failure;
 use crate::tasks::scan::{Found, scan};
 use std::time::Duration;
 
-/// The wait for answers after the last request of the first round of an SDO scan.
+/// The waiting time for answers after the last request of the first round of an SDO scan.
 const SCAN_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// The number of requests to a silent node.

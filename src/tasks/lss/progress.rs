@@ -41,7 +41,7 @@ pub struct Progress {
     pub id: Option<(NodeId, Stage)>,
     /// The new bit rate, if requested.
     pub rate: Option<(PlannedRate, Stage)>,
-    /// The progress of storing both.
+    /// The progress of storing the new values.
     pub stored: Stage,
     /// Whether the host works at the new bit rate.
     pub is_retimed: bool,

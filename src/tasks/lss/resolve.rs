@@ -57,8 +57,8 @@ fn by_address(
     descriptions: &Descriptions<'_>,
     notify: Notify<'_>,
 ) -> Result<LssDevice, Failure> {
-    // With this target, LSS addresses only one of two devices with the same node-ID. So it can be used to separate
-    // them.
+    // With this target, LSS addresses only one of two devices with the same node-ID. So this target can be used to
+    // separate the two devices.
     master.set_on_two_devices(OnTwoDevices::Report);
     let mut device = LssDevice::with_address(address);
     // A device that requires another NMT state does not answer LSS here, but may answer SDO.

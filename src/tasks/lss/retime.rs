@@ -23,8 +23,8 @@ use crate::tasks::{Effect, Failure, Kind};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The delay of the activation (15h). The device uses the old bit rate for this time, then it is silent for this time.
-/// As in table 8 of the DPS manual.
+/// The delay of the activation (15h). The device uses the old bit rate for this time, then it is silent for the same
+/// time (table 8 of the DPS manual).
 const DELAY_MS: u16 = 1000;
 const DELAY: Duration = Duration::from_millis(DELAY_MS as u64);
 

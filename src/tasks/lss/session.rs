@@ -75,7 +75,7 @@ pub(super) fn enter_state(
         AssignState::PreOperational => (NmtCommand::EnterPreOperational, NmtState::PreOperational),
         AssignState::Stopped => (NmtCommand::Stop, NmtState::Stopped),
     };
-    // Sent even if the state is already right, as in the manuals.
+    // The command is sent even if the node is already in this state, as in the manuals.
     master.send(command.frame(Some(node)));
     Ok(Some(PreviousState { node, state, changed_to: required }).filter(|_| state != Some(target)))
 }

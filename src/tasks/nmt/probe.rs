@@ -89,8 +89,8 @@ pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) ->
     Ok(Probe { report, failure, left })
 }
 
-/// Writes the old heartbeat time and reads it back, even after Ctrl-C. Also returns whether a write was acknowledged:
-/// a frame with a flipped bit is acknowledged, too.
+/// Writes the old heartbeat time and reads it back, even after Ctrl-C. Also returns whether a write was acknowledged.
+/// This does not prove the value: a frame with a flipped bit is acknowledged, too.
 fn restore(master: &mut Master<'_>, node: &Node, before: u16) -> (Result<(), Error>, bool) {
     let mut is_acknowledged = false;
     let mut attempt = |master: &mut Master<'_>| {

@@ -74,7 +74,7 @@ impl Watcher<'_> {
         self.heartbeats.values().filter_map(Heartbeat::lost_at).min().map_or(self.end, |at| at.min(self.end))
     }
 
-    /// Takes the heartbeat time of a node from the answer to its read.
+    /// Stores the heartbeat time of a node from the answer to a read.
     fn on_answer(&mut self, ticket: Ticket, result: Result<Answer, SdoError>) {
         let Some(node) = self.reads.remove(&ticket) else { return };
         let value = result.and_then(|answer| answer.value(node, HEARTBEAT_TIME, Some(DataType::Unsigned(2))));

@@ -277,7 +277,7 @@ impl Change<'_, '_> {
         self.failure(error).with(self.session.node.id, PdoEffect::Incomplete(Box::new(incomplete)))
     }
 
-    /// Adds notes if the new settings determine when the TPDO is sent in a way that the user may not expect.
+    /// Adds notes about effects that the user may not expect: when the TPDO is sent with the new settings.
     fn note_consequences(&mut self) {
         let Settings { number, event_timer_ms, .. } = self.wanted;
         let transmission = self.wanted.transmission();

@@ -18,7 +18,7 @@ use std::time::Duration;
 pub struct FilterReport {
     /// The filter, read from the device.
     pub filter: FilterOf,
-    /// Whether 61A1h shows the new damping; `None` if no damping was set.
+    /// Whether the filter constant (61A1h) changed with the new damping; `None` if no damping was set.
     pub damping_shown: Option<bool>,
     /// Further notes.
     pub notes: Vec<Note>,

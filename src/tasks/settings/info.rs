@@ -290,7 +290,7 @@ fn manufacturer_objects(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId
     let of_profile = |object: ObjectId| !is_described && (0x6000..0xa000).contains(&object.index);
     let entries = entries.filter(|entry| {
         let object = entry.object;
-        // Sub-index 0 of numbered entries is their number.
+        // Sub-index 0 of numbered entries contains the number of entries.
         let is_count = entry.name.ends_with("-entries") || entry.numbered && object.sub == 0;
         (page::is_own(object) || of_profile(object) && !is_count) && entry.access.is_readable()
     });

@@ -13,7 +13,7 @@ use crate::measure::layout::Signal;
 use crate::node::Node;
 use crate::tasks::{Fact, Failure, Kind, Note};
 
-/// One of the four settings.
+/// One of the four trigger settings of a signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
     /// x133h: a change by at least this value triggers the TPDO.

@@ -27,7 +27,7 @@ pub struct Snapshot {
     pub object: ObjectId,
     /// Its name, if it is known.
     pub name: Option<String>,
-    /// Its bytes, in the width of its type if that is known.
+    /// Its bytes, in the width of its type if the type is known.
     pub bytes: Vec<u8>,
     /// Its type, if it is known.
     pub data_type: Option<DataType>,

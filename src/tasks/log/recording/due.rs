@@ -29,7 +29,7 @@ struct DueTpdo {
 #[derive(Debug, Default)]
 pub(super) struct DueTpdos {
     tpdos: BTreeMap<CanId, DueTpdo>,
-    /// The last SYNC, until its cycle ends.
+    /// The time of the last SYNC.
     last: Option<Mono>,
 }
 

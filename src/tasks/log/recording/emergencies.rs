@@ -16,9 +16,9 @@ use std::sync::Arc;
 #[derive(Debug, Default)]
 pub(super) struct Emergencies {
     nodes: BTreeMap<CanId, NodeId>,
-    /// The descriptions.
+    /// The descriptions of the nodes.
     models: BTreeMap<NodeId, Arc<Model>>,
-    /// The last emergency of each node that repeats it while it is pending ([`Quirk::EmergencyRepeats`]).
+    /// The last emergency of each node that repeats pending emergencies ([`Quirk::EmergencyRepeats`]).
     repeating: BTreeMap<NodeId, Option<Emergency>>,
     /// The emergencies that were reported a short time ago.
     recent: Repetitions<(NodeId, Emergency)>,

@@ -1,4 +1,4 @@
-//! The result of a recording.
+//! Creates the report of a recording.
 
 use super::Recording;
 use crate::canopen::id::NodeId;

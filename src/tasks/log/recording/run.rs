@@ -26,7 +26,7 @@ struct Schedule {
     /// The recording ends at this moment if it has no row.
     give_up: Mono,
     next_tick: Mono,
-    /// After Ctrl-C: frames received until this moment are still recorded.
+    /// The time of the first Ctrl-C. Frames received until then are still recorded.
     interrupted_at: Option<Mono>,
 }
 

@@ -25,7 +25,7 @@ pub(super) struct Tally {
     pub(super) emergencies: u64,
     /// Intervals that were too long.
     pub(super) gaps: u64,
-    /// Polls that were not sent because the previous one was not finished.
+    /// Polls that were not sent because the previous poll was not finished.
     pub(super) skipped: u64,
     /// Other events.
     pub(super) events: EventCounts,
@@ -82,7 +82,7 @@ impl Tally {
         self.statistics.get(source).map_or(0, Statistics::count)
     }
 
-    /// Sets the end of the recording. It never moves back.
+    /// Moves the end of the recording to this time, but never back.
     pub(super) fn extend_to(&mut self, at: Mono) {
         self.end = self.end.max(at);
     }
