@@ -251,7 +251,7 @@ fn is_stale(before: ValueWithUnit, after: ValueWithUnit, scale: Scale) -> bool {
         Number::Decimal { digits, .. } => 10f64.powi(-i32::from(digits)),
         Number::Real32(_) | Number::Real64(_) => 0.0,
     };
-    old_number == new_number && (expected - new_number).abs() > step + 1e-6 * expected.abs()
+    was == is && (expected - is).abs() > step + 1e-6 * expected.abs()
 }
 
 #[cfg(test)]
