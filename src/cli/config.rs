@@ -6,6 +6,7 @@ mod table;
 
 use super::args::Nodes;
 use super::exit::{FileError, open_stdout, stdout};
+use super::file::{as_text, read_input};
 use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -21,7 +22,7 @@ use crate::tasks::config::{ConfigFailure, Mistake, Problem, read};
 use crate::tasks::{self, Failure};
 use clap::{Args, Subcommand};
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::Path;
 
 /// Show all settings of a device as a file, compare them with a file, and set them from a file
@@ -105,9 +106,6 @@ impl Dump {
     }
 }
 
-/// The maximum size of a settings file, in bytes.
-const MAX_FILE: u64 = 16 << 20;
-
 /// Reads a settings file: a DCF if the extension is dcf or eds, otherwise TOML.
 fn file(name: &str, global: &Global) -> anyhow::Result<tasks::config::File> {
     let extension = Path::new(name).extension().map(|extension| extension.to_ascii_lowercase());
@@ -132,9 +130,8 @@ fn file(name: &str, global: &Global) -> anyhow::Result<tasks::config::File> {
 
 /// Reads a file with settings in TOML.
 fn document(file: &str) -> anyhow::Result<Document> {
-    let mut text = String::new();
-    File::open(file)
-        .and_then(|opened| opened.take(MAX_FILE).read_to_string(&mut text))
+    let text = File::open(file)
+        .and_then(|opened| as_text(read_input(opened)?))
         .map_err(|source| FileError { what: format!("read {file}"), source })?;
     parse(file, &text)
 }

@@ -2,6 +2,7 @@
 
 use super::Global;
 use super::exit::{FileError, IntoFailure};
+use super::file::read_input;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -15,12 +16,8 @@ use crate::node::survey::revisions;
 use crate::output::failure::ErrorMessage;
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
-
-/// The longest file that is read, so that `--eds /dev/zero` does not fill the memory.
-const MAX_FILE: u64 = 16 << 20;
 
 /// A description or EDS that the user named.
 #[derive(Clone, Debug)]
@@ -263,9 +260,7 @@ pub(super) fn unknown(name: &str) -> ErrorMessage {
 
 /// Reads the bytes of a file that the user named.
 pub(super) fn read_file(name: &str) -> Result<Vec<u8>, FileError> {
-    let mut bytes = Vec::new();
-    let read = File::open(name).and_then(|file| file.take(MAX_FILE).read_to_end(&mut bytes));
-    read.map(|_| bytes).map_err(|source| FileError { what: format!("read {name}"), source })
+    File::open(name).and_then(read_input).map_err(|source| FileError { what: format!("read {name}"), source })
 }
 
 /// Prints one line for all warnings; with `-v`, prints each warning.

@@ -1,4 +1,5 @@
-//! Files that a command writes. They are opened before the bus, so that a wrong name has no effect on the bus.
+//! Files that a command reads or writes. Files to write are opened before the bus, so that a wrong name has no effect on
+//! the bus.
 
 use super::exit::{FileError, open_stdout};
 use crate::bus::file::{Locked, is_same, lock, wait_for_reader};
@@ -7,9 +8,34 @@ use crate::output::rows::{ExistingLines, OutputTarget, existing_lines};
 use crate::tasks::Kind;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+
+/// The maximum size of a description, an EDS or a settings file, in bytes. With it, `--eds /dev/zero` does not fill the
+/// memory.
+const MAX_INPUT: u64 = 16 << 20;
+
+/// Reads the content of a file that contains a description or settings.
+///
+/// # Errors
+/// The file cannot be read, or is larger than 16 MiB.
+pub(super) fn read_input(file: File) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    file.take(MAX_INPUT + 1).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 > MAX_INPUT {
+        true => Err(io::Error::new(io::ErrorKind::FileTooLarge, "the file is larger than 16 MiB")),
+        false => Ok(bytes),
+    }
+}
+
+/// Returns the bytes as text.
+///
+/// # Errors
+/// The bytes are not UTF-8.
+pub(super) fn as_text(bytes: Vec<u8>) -> io::Result<String> {
+    String::from_utf8(bytes).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "the text is not UTF-8"))
+}
 
 /// How an existing file is treated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

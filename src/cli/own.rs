@@ -1,17 +1,15 @@
 //! The descriptions of the user: `$XDG_CONFIG_HOME/cangauge/devices/` and `/usr/share/cangauge/devices/`.
 
 use super::Global;
+use super::file::{as_text, read_input};
 use crate::bus::owner::is_trusted;
 use crate::device::catalog::{self, Model};
 use crate::output::failure::ErrorMessage;
 use std::env;
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// The maximum size of a description file, in bytes.
-const MAX_FILE: u64 = 16 << 20;
 
 /// Returns the folders; the folder of the user is the first.
 fn folders() -> Vec<PathBuf> {
@@ -63,9 +61,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 fn read(path: &Path) -> Result<Model, String> {
     let text = || -> io::Result<Option<String>> {
         let file = File::open(path)?;
-        let mut text = String::new();
-        let is_trusted = is_trusted(&file)?;
-        Ok(if is_trusted { file.take(MAX_FILE).read_to_string(&mut text).map(|_| Some(text))? } else { None })
+        if is_trusted(&file)? { as_text(read_input(file)?).map(Some) } else { Ok(None) }
     };
     let name = path.display().to_string();
     let Some(text) = text().map_err(|error| format!("{name}: {error}"))? else {

@@ -46,9 +46,9 @@ impl ConfigRecord<'_> {
         let mut page = format!(
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Settings</title>\n<style>body{{font:11pt \
              sans-serif;margin:2em}}table{{border-collapse:collapse;margin:1em 0}}td,th{{border:1px solid #999;padding:2px \
-             8px;text-align:left}}h2{{page-break-after:avoid}}</style></head><body>\n<h1>Settings of {} devices</h1>\n\
+             8px;text-align:left}}h2{{page-break-after:avoid}}</style></head><body>\n<h1>Settings of {}</h1>\n\
              <p>{} &middot; cangauge {} &middot; bus {} &middot; file {}</p>\n",
-            self.done.len(),
+            if self.done.len() == 1 { "1 device".to_owned() } else { format!("{} devices", self.done.len()) },
             self.time(),
             env!("CARGO_PKG_VERSION"),
             escape(&self.bus),

@@ -235,6 +235,17 @@ fn a_file_that_is_no_toml_has_its_place() {
 }
 
 /// The settings of another kind of device, measuring range and reference are refused before the first write.
+/// The end of a file is never cut off: the settings after it would be lost.
+#[test]
+fn file_larger_than_16_mib_is_refused() {
+    let bench = Bench::of("mh4@1");
+    let comment = format!("#{}\n", "-".repeat(16 << 20));
+    std::fs::write(bench.path("large.toml"), format!("[node]\nheartbeat = \"100ms\"\n{comment}")).expect("written");
+    for words in ["config apply 1 large.toml", "info 1 --eds large.toml"] {
+        bench.run(words).fails(8, "cangauge: read large.toml: the file is larger than 16 MiB\n");
+    }
+}
+
 #[test]
 fn another_device_is_refused() {
     let bench = Bench::of(ALL);
