@@ -96,6 +96,13 @@ STOP_SYNC = [("000#8005", None), ("2F001802FF000000", "60")]
 
 PYTHON_CANOPEN = {
     **COMMON,
+    "404-20": (
+        "device.py keeps the scale of 9130h:1 (-10000) if the digits in 6132h:1 are changed.",
+        [
+            ("4032610100000000", "4F32610102"), ("4030910100000000", "43309101F0D8FFFF"), ("2F32610101000000", "60326101"),
+            ("4030910100000000", "43309101F0D8FFFF"), ("2F32610102000000", "60"),
+        ],
+    ),
     "SDO-17": (
         "After the last segment of an upload, a further segment request is answered with an empty segment.",
         [
