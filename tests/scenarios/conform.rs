@@ -223,11 +223,11 @@ fn other_nodes_are_a_reason_to_refuse() {
     assert_eq!(deviations(&report), []);
 }
 
-/// Ctrl-C after each frame of an area. The device has its old settings and its old state.
+/// Ctrl-C after each seventh frame of an area, with and without `--store`. The device has its old settings and its old state.
 #[test]
 fn an_interrupted_check_restores_the_device() {
     for area in Area::ALL {
-        for kind in ["mh4", "mc1609"] {
+        for kind in ["mh4", "d20", "mc1609", "dps"] {
             let file = (area == Area::Eds).then(|| eds(kind, &[]));
             let options =
                 ConformOptions { only: Some(area), store: file.is_some(), eds: file, ..ConformOptions::default() };
