@@ -223,7 +223,7 @@ fn other_nodes_are_a_reason_to_refuse() {
     assert_eq!(deviations(&report), []);
 }
 
-/// Ctrl-C after each seventh frame of an area, with and without `--store`. The device has its old settings and its old state.
+/// Ctrl-C after some frames of each area. The device has its old settings and its old state.
 #[test]
 fn an_interrupted_check_restores_the_device() {
     for area in Area::ALL {
