@@ -64,12 +64,12 @@
 //!
 //! ```
 //! use cangauge::canopen::frame::Frame;
-//! use cangauge::canopen::pdo::{MappingEntry, lay_out};
+//! use cangauge::canopen::pdo::{MappingEntry, field_layout};
 //! use cangauge::canopen::value::{DataType, Value};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // TPDO1 of an MH-4: pressure (6130h:1, REAL32) and its status (6150h:1, UNSIGNED8).
-//! let fields = lay_out(&[0x6130_0120, 0x6150_0108].map(MappingEntry::from_word));
+//! let fields = field_layout(&[0x6130_0120, 0x6150_0108].map(MappingEntry::from_word));
 //! let frame: Frame = "181#2ED5A43F00".parse()?;
 //! let (bytes, length) = fields[0].bytes(frame.data()).ok_or("the frame is too short")?;
 //! assert_eq!(DataType::Real32.decode(&bytes[..length])?, Value::Real32(1.2877557));

@@ -9,7 +9,7 @@ use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog::{Model, built_in};
 use cangauge::device::description::{Access, ObjectEntry, Remap, Signature, SizeIndication};
 use cangauge::device::dictionary::Entry;
-use cangauge::master::{Happening, Master, Request, SdoFailure, Timing};
+use cangauge::master::{Master, MasterEvent, Request, SdoFailure, Timing};
 use cangauge::sim::{Device, Setup};
 use std::sync::Arc;
 use std::time::Duration;
@@ -451,7 +451,7 @@ fn hydac_stores_its_node_id_with_1010h_4_only() {
             let later = device.master.now() + Duration::from_secs(1);
             let mut heard = Vec::new();
             while device.master.now() < later {
-                if let Happening::Frame(received) = device.master.next(later).expect("the bus works") {
+                if let MasterEvent::Frame(received) = device.master.next(later).expect("the bus works") {
                     heard.push(received.frame.to_string());
                 }
             }

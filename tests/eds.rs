@@ -700,7 +700,7 @@ fn every_name_in_every_file_can_be_typed() {
             is_known
                 && !path.ends_with("26-duplicates.eds")
                 && !name.is_empty()
-                && !ObjectId::reads_as_address(name)
+                && !ObjectId::looks_like_address(name)
                 && name.chars().count() <= 241
         };
         for (object, name) in names_in(text.trim_start_matches('\u{feff}')).into_iter().filter(named) {

@@ -46,7 +46,7 @@ impl<B: Bus> SdoChannels<B> {
 }
 
 impl<B: Bus> Bus for SdoChannels<B> {
-    delegate_bus!(self, self.bus => name timestamps is_live sends_remote_frames waits now mono receive_buffer late_drops finish);
+    delegate_bus!(self, self.bus => name timestamps is_live sends_remote_frames waits now mono receive_buffer unreported_drops finish);
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
         match filters {

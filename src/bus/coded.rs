@@ -20,7 +20,7 @@ pub enum Codec {
 }
 
 /// A bus whose frames pass through the text format of a transport.
-pub struct Coded<B> {
+pub struct TextRoundTrip<B> {
     bus: B,
     codec: Option<Codec>,
     /// The state of the random numbers that choose the cuts.
@@ -33,12 +33,21 @@ pub struct Coded<B> {
     arrived: VecDeque<Event>,
 }
 
-impl<B: Bus> Coded<B> {
+impl<B: Bus> TextRoundTrip<B> {
     /// Wraps a bus. The seed chooses the cuts. Without a codec, nothing changes.
-    pub fn new(bus: B, codec: Option<(Codec, u64)>) -> Coded<B> {
+    pub fn new(bus: B, codec: Option<(Codec, u64)>) -> TextRoundTrip<B> {
         let (codec, seed) = codec.unzip();
         let (lines, messages, seed) = (slcan::Lines::default(), Messages::default(), seed.unwrap_or(0));
-        Coded { bus, codec, seed, lines, messages, text: Vec::new(), times: VecDeque::new(), arrived: VecDeque::new() }
+        TextRoundTrip {
+            bus,
+            codec,
+            seed,
+            lines,
+            messages,
+            text: Vec::new(),
+            times: VecDeque::new(),
+            arrived: VecDeque::new(),
+        }
     }
 
     /// The inner bus.
@@ -107,12 +116,12 @@ impl<B: Bus> Coded<B> {
     }
 }
 
-impl<B: Bus> BitRateControl for Coded<B> {
+impl<B: Bus> BitRateControl for TextRoundTrip<B> {
     delegate_bus!(self, self.bus => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
 }
 
-impl<B: Bus> Bus for Coded<B> {
-    delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
+impl<B: Bus> Bus for TextRoundTrip<B> {
+    delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer unreported_drops finish);
 
     fn sends_remote_frames(&self) -> bool {
         self.codec != Some(Codec::Socketcand) && self.bus.sends_remote_frames()
@@ -151,7 +160,7 @@ mod tests {
         let timed = || (0u64..).map(|at| Mono::at(Duration::from_micros(100 * at))).zip(texts);
         for (codec, seed) in (0..100).map(|seed| ([Codec::Slcan, Codec::Socketcand][usize::from(seed < 50)], seed)) {
             let script = timed().fold(Script::new(), |script, (at, text)| script.frame(at, text));
-            let mut bus = Coded::new(script, Some((codec, seed)));
+            let mut bus = TextRoundTrip::new(script, Some((codec, seed)));
             let mut received = Vec::new();
             while let Ok(Event::Frame(Received { frame, at })) = bus.receive(Mono::at(Duration::from_secs(1))) {
                 received.push((at.mono, frame.to_string()));

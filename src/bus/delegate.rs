@@ -17,7 +17,7 @@
 ///
 /// impl<B: Bus> Bus for Counting<B> {
 ///     cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live sends_remote_frames waits now mono listen receive
-///         receive_buffer late_drops finish);
+///         receive_buffer unreported_drops finish);
 ///
 ///     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
 ///         self.sent += 1;
@@ -86,9 +86,9 @@ macro_rules! delegate_bus {
             $inner.receive_buffer()
         }
     };
-    ($this:ident, $inner:expr => late_drops) => {
-        fn late_drops(&mut $this) -> u32 {
-            $inner.late_drops()
+    ($this:ident, $inner:expr => unreported_drops) => {
+        fn unreported_drops(&mut $this) -> u32 {
+            $inner.unreported_drops()
         }
     };
     ($this:ident, $inner:expr => finish) => {
@@ -194,7 +194,7 @@ mod tests {
             Some(BUFFER)
         }
 
-        fn late_drops(&mut self) -> u32 {
+        fn unreported_drops(&mut self) -> u32 {
             11
         }
 
@@ -229,7 +229,7 @@ mod tests {
         assert_eq!((bus.name(), bus.timestamps()), ("unusual", TimestampSource::Recorded));
         assert_eq!((bus.is_live(), bus.waits(), bus.now()), (false, false, NOW));
         assert_eq!((bus.mono(), bus.bit_rate()), (Mono::at(Duration::from_secs(5)), Some(33_333)));
-        assert_eq!((bus.receive_buffer(), bus.late_drops()), (Some(BUFFER), 11));
+        assert_eq!((bus.receive_buffer(), bus.unreported_drops()), (Some(BUFFER), 11));
         assert_eq!(bus.receive(Mono::START)?, Event::Dropped(7));
         bus.listen(&Filters::All)?;
         bus.send(&Frame::empty(CanId::SYNC))?;

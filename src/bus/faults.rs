@@ -163,7 +163,7 @@ impl<B: Bus> BitRateControl for Faulty<B> {
 }
 
 impl<B: Bus> Bus for Faulty<B> {
-    delegate_bus!(self, self.bus => name timestamps is_live sends_remote_frames waits now mono listen receive_buffer late_drops finish);
+    delegate_bus!(self, self.bus => name timestamps is_live sends_remote_frames waits now mono listen receive_buffer unreported_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sends;

@@ -89,7 +89,7 @@ fn ignore_background_reads() {}
 ///
 /// # Errors
 /// The system rejects the handler.
-pub fn survive_file_size_limit() -> io::Result<()> {
+pub fn handle_file_size_limit() -> io::Result<()> {
     #[cfg(unix)]
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
     Ok(())

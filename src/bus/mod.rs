@@ -103,7 +103,7 @@ pub trait Bus: BitRateControl {
 
     /// Returns the number of dropped frames that no [`Event::Dropped`] reported. The kernel reports drops with the next
     /// frame, so drops after the last frame are reported only here. Each dropped frame is counted once.
-    fn late_drops(&mut self) -> u32 {
+    fn unreported_drops(&mut self) -> u32 {
         0
     }
 
@@ -155,7 +155,7 @@ pub trait BitRateControl {
 
 impl<B: Bus + ?Sized> Bus for Box<B> {
     delegate_bus!(self, (**self) => name timestamps is_live sends_remote_frames waits now mono listen send receive receive_buffer
-        late_drops finish);
+        unreported_drops finish);
 }
 
 impl<B: BitRateControl + ?Sized> BitRateControl for Box<B> {
@@ -164,7 +164,7 @@ impl<B: BitRateControl + ?Sized> BitRateControl for Box<B> {
 
 impl<B: Bus + ?Sized> Bus for &mut B {
     delegate_bus!(self, (**self) => name timestamps is_live sends_remote_frames waits now mono listen send receive receive_buffer
-        late_drops finish);
+        unreported_drops finish);
 }
 
 impl<B: BitRateControl + ?Sized> BitRateControl for &mut B {

@@ -18,14 +18,14 @@ const MAX_LATENCY: Duration = Duration::from_millis(50);
 /// of the clocks. The offset may grow only as fast as the clocks can drift. The result is never later than the time of
 /// the kernel, and at most [`MAX_LATENCY`] earlier. It never goes backwards.
 #[derive(Debug, Default)]
-pub(super) struct OwnClock {
+pub(super) struct InterfaceClock {
     /// The last time of the interface clock, and the offset of the host clock from it, in nanoseconds.
     last_offset: Option<(i128, i128)>,
     /// When the last frame was received.
     last: Mono,
 }
 
-impl OwnClock {
+impl InterfaceClock {
     /// Returns the time of a frame that the interface received at `own` (on its clock) and the kernel at `kernel`.
     pub(super) fn place(&mut self, own: Duration, kernel: Stamp) -> Stamp {
         let own = nanoseconds(own);
@@ -85,7 +85,7 @@ mod tests {
     fn intervals_follow_the_clock_of_the_interface() {
         // The clock started an hour earlier and runs 80 ppm too fast or too slow for half an hour.
         for wrong in [-80, 0, 80] {
-            let mut clock = OwnClock::default();
+            let mut clock = InterfaceClock::default();
             let mut last = None;
             for n in 0..180_000 {
                 let on_the_bus = us(n * 10_000);
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_is_set_never_exceeds_the_kernels_time() {
-        let mut clock = OwnClock::default();
+        let mut clock = InterfaceClock::default();
         let mut last = Mono::START;
         for n in 0..2000u64 {
             // The clock restarts, jumps ahead, stands still, or shows random values.
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn a_frame_after_one_without_hardware_time_is_not_earlier() {
-        let mut clock = OwnClock::default();
+        let mut clock = InterfaceClock::default();
         clock.place(us(1000), kernel(us(5000)));
         clock.pass(kernel(us(9000)));
         assert_eq!(clock.place(us(3000), kernel(us(9100))).mono, Mono::at(us(9000)));

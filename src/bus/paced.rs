@@ -151,7 +151,7 @@ impl<B: Bus> Paced<B> {
 }
 
 impl<B: Bus> Bus for Paced<B> {
-    delegate_bus!(self, self.bus => name timestamps is_live sends_remote_frames waits now mono receive_buffer late_drops finish);
+    delegate_bus!(self, self.bus => name timestamps is_live sends_remote_frames waits now mono receive_buffer unreported_drops finish);
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
         self.filters = filters.clone();

@@ -4,7 +4,7 @@
 //! server answers each one with `< ok >`. Received frames are `< frame 1A4 1436509052.249713 0011AA >`, sent frames are
 //! `< send 1A4 3 0 11 aa >`. The protocol does not support remote frames.
 
-use super::own_clock::OwnClock;
+use super::own_clock::InterfaceClock;
 use super::stream::{Output, Protocol};
 use super::{BusError, Event, Fault, Mono, Received, Stamp, TimestampSource};
 use crate::canopen::frame::Frame;
@@ -174,7 +174,7 @@ pub(super) struct Client {
     stage: Stage,
     deadline: Mono,
     messages: Messages,
-    clock: OwnClock,
+    clock: InterfaceClock,
 }
 
 impl Client {
@@ -184,7 +184,7 @@ impl Client {
             stage: Stage::Greeting,
             deadline: Mono::START,
             messages: Messages::default(),
-            clock: OwnClock::default(),
+            clock: InterfaceClock::default(),
         }
     }
 

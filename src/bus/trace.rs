@@ -86,7 +86,7 @@ impl<B: Bus> BitRateControl for Traced<B> {
 }
 
 impl<B: Bus> Bus for Traced<B> {
-    delegate_bus!(self, self.bus => timestamps is_live sends_remote_frames waits now mono listen receive_buffer late_drops);
+    delegate_bus!(self, self.bus => timestamps is_live sends_remote_frames waits now mono listen receive_buffer unreported_drops);
 
     fn name(&self) -> &str {
         &self.name

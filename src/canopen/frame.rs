@@ -99,7 +99,7 @@ impl Frame {
     }
 
     /// The eight data bytes of an SDO or LSS frame; `None` if the frame is shorter.
-    pub fn all_eight(&self) -> Option<[u8; 8]> {
+    pub fn as_eight_bytes(&self) -> Option<[u8; 8]> {
         (self.len == 8 && !self.remote).then_some(self.data)
     }
 }

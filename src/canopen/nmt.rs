@@ -113,28 +113,28 @@ impl fmt::Display for NmtState {
 
 /// The content of a frame with COB-ID 700h + node-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Life {
+pub enum ErrorControlMessage {
     /// The boot-up message: one byte 00h. The node was started or reset.
     BootUp,
     /// A heartbeat or a node guarding answer.
     State(NmtState),
 }
 
-impl Life {
+impl ErrorControlMessage {
     /// Parses a heartbeat, boot-up message or node guarding answer. `None` for any other frame, including remote
     /// frames (guarding requests).
     ///
     /// Some devices send more than one byte; only the first is used. A frame of 0 bytes on 700h + node-ID is ignored.
     /// It is usually a guarding request whose RTR bit was lost. A frame of 0 bytes on 080h + node-ID is the boot-up
     /// message of devices older than CiA 301 version 4.
-    pub fn parse(frame: &Frame) -> Option<(NodeId, Life)> {
+    pub fn parse(frame: &Frame) -> Option<(NodeId, ErrorControlMessage)> {
         if let (Some(node), []) = (frame.id().emergency_node(), frame.data()) {
-            return (!frame.is_remote()).then_some((node, Life::BootUp));
+            return (!frame.is_remote()).then_some((node, ErrorControlMessage::BootUp));
         }
         let node = frame.id().heartbeat_node()?;
         match frame.data() {
-            [0x00, ..] => Some((node, Life::BootUp)),
-            [code, ..] => Some((node, Life::State(NmtState::from_code(*code)))),
+            [0x00, ..] => Some((node, ErrorControlMessage::BootUp)),
+            [code, ..] => Some((node, ErrorControlMessage::State(NmtState::from_code(*code)))),
             [] => None,
         }
     }
@@ -149,7 +149,7 @@ impl Life {
 
 /// Returns the node that sent this boot-up message; `None` for other frames.
 pub fn booted(frame: &Frame) -> Option<NodeId> {
-    Life::parse(frame).filter(|(_, life)| *life == Life::BootUp).map(|(node, _)| node)
+    ErrorControlMessage::parse(frame).filter(|(_, life)| *life == ErrorControlMessage::BootUp).map(|(node, _)| node)
 }
 
 #[cfg(test)]
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn first_byte_of_a_heartbeat_is_the_state() {
         let node = NodeId::MAX;
-        assert_eq!(Life::parse(&frame("77F#00")), Some((node, Life::BootUp)));
+        assert_eq!(ErrorControlMessage::parse(&frame("77F#00")), Some((node, ErrorControlMessage::BootUp)));
         for (text, state) in [
             ("77F#04", NmtState::Stopped),
             ("77F#05", NmtState::Operational),
@@ -193,14 +193,22 @@ mod tests {
             ("77F#0500000000000000", NmtState::Operational),
             ("77F#7F01", NmtState::PreOperational),
         ] {
-            assert_eq!(Life::parse(&frame(text)), Some((node, Life::State(state))), "{text}");
+            assert_eq!(
+                ErrorControlMessage::parse(&frame(text)),
+                Some((node, ErrorControlMessage::State(state))),
+                "{text}"
+            );
         }
         for text in ["77F#", "77F#R1", "080#", "0FF#R0", "0FF#00", "700#00", "7FF#7F", "0000077F#00"] {
-            assert_eq!(Life::parse(&frame(text)), None, "{text}");
+            assert_eq!(ErrorControlMessage::parse(&frame(text)), None, "{text}");
         }
-        assert_eq!(Life::parse(&frame("77F#0000")), Some((node, Life::BootUp)));
-        assert_eq!(Life::parse(&frame("0FF#")), Some((node, Life::BootUp)), "before CiA 301 version 4");
-        let unusual = |text| Life::unusual_length(&frame(text)).map(|(_, length)| length);
+        assert_eq!(ErrorControlMessage::parse(&frame("77F#0000")), Some((node, ErrorControlMessage::BootUp)));
+        assert_eq!(
+            ErrorControlMessage::parse(&frame("0FF#")),
+            Some((node, ErrorControlMessage::BootUp)),
+            "before CiA 301 version 4"
+        );
+        let unusual = |text| ErrorControlMessage::unusual_length(&frame(text)).map(|(_, length)| length);
         assert_eq!(
             (unusual("77F#"), unusual("77F#05"), unusual("77F#0500"), unusual("77F#R1")),
             (Some(0), None, Some(2), None)

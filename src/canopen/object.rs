@@ -39,7 +39,7 @@ impl ObjectId {
     }
 
     /// Whether a text is an address, or a wrong address (`12345`, `6130:300`), and therefore not a name.
-    pub fn reads_as_address(text: &str) -> bool {
+    pub fn looks_like_address(text: &str) -> bool {
         let is_part = |character: char| character.is_ascii_hexdigit() || "xXhH:.".contains(character);
         let index = text.split([':', '.']).next().unwrap_or(text);
         let is_long = index.len() >= 4 || index.starts_with("0x") || index.starts_with("0X");

@@ -186,7 +186,7 @@ impl Field {
 /// Returns the fields of a mapping. Each field starts at the end of the previous field (CiA 301, 7.5.2.36).
 ///
 /// Some devices set the highest bit of an entry's length. A PDO has at most 64 bits, so the lower seven bits are used.
-pub fn lay_out(mapping: &[MappingEntry]) -> Vec<Field> {
+pub fn field_layout(mapping: &[MappingEntry]) -> Vec<Field> {
     let mut start = 0u16;
     mapping
         .iter()
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn a_tpdo_is_decoded_by_its_mapping() {
-        let fields = lay_out(&[MappingEntry::from_word(0x6130_0120), MappingEntry::from_word(0x6150_0108)]);
+        let fields = field_layout(&[MappingEntry::from_word(0x6130_0120), MappingEntry::from_word(0x6150_0108)]);
         let data = [0x50, 0xc3, 0, 0, 3];
         assert_eq!(fields[0].bytes(&data), Some(([0x50, 0xc3, 0, 0, 0, 0, 0, 0], 4)));
         assert_eq!(fields[1].bytes(&data), Some(([3, 0, 0, 0, 0, 0, 0, 0], 1)));
@@ -243,7 +243,7 @@ mod tests {
             MappingEntry { object: ObjectId::new(1, 0), bits: 3 },
             MappingEntry { object: ObjectId::new(2, 0), bits: 13 },
         ];
-        let fields = lay_out(&entries);
+        let fields = field_layout(&entries);
         assert_eq!(fields[1].bytes(&[0b1010_1101, 0xff]), Some(([0xf5, 0x1f, 0, 0, 0, 0, 0, 0], 2)));
     }
 
@@ -270,7 +270,7 @@ mod tests {
                 data in proptest::collection::vec(any::<u8>(), 0..=8),
             ) {
                 let mapping: Vec<_> = words.into_iter().map(MappingEntry::from_word).collect();
-                for field in lay_out(&mapping) {
+                for field in field_layout(&mapping) {
                     let fits = usize::from(field.start) + usize::from(field.entry.bits) <= data.len() * 8;
                     prop_assert_eq!(field.bytes(&data).is_some(), fits);
                 }

@@ -127,7 +127,9 @@ impl FromStr for SignalArg {
             }
             match object.parse::<ObjectId>() {
                 Ok(object) => return Ok(SignalArg(Wanted::Object(object, data_type))),
-                Err(error) if data_type.is_some() || ObjectId::reads_as_address(text) => return Err(error.to_string()),
+                Err(error) if data_type.is_some() || ObjectId::looks_like_address(text) => {
+                    return Err(error.to_string());
+                }
                 Err(_) => {}
             }
         }
@@ -159,7 +161,7 @@ impl FromStr for ObjectArg {
         if let Ok(object) = text.parse() {
             return Ok(ObjectArg::Address(object));
         }
-        if !text.trim().is_empty() && !ObjectId::reads_as_address(text) {
+        if !text.trim().is_empty() && !ObjectId::looks_like_address(text) {
             return Ok(ObjectArg::Name(text.trim().to_owned()));
         }
         Err(format!("\"{text}\" is neither an object (0x1018:1) nor a name (vendor-id, ai-input-pv:1)"))

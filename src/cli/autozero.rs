@@ -10,7 +10,7 @@ use crate::master::Master;
 use crate::node::Overrides;
 use crate::output::autozero::ZeroReport;
 use crate::output::notes;
-use crate::tasks::autozero::{AutozeroFailure, Limit, Options, ZeroTarget, Zeroed, autozero};
+use crate::tasks::autozero::{AutozeroFailure, AutozeroReport, Limit, Options, ZeroTarget, autozero};
 use crate::tasks::failure::Cause;
 use crate::tasks::{Failure, Kind};
 use clap::Args;
@@ -91,7 +91,7 @@ impl Autozero {
 pub(super) fn run_each(
     global: &Global,
     nodes: &Nodes,
-    work: impl FnMut(&mut Master<'_>, NodeId, &Overrides) -> Result<Zeroed, Failure>,
+    work: impl FnMut(&mut Master<'_>, NodeId, &Overrides) -> Result<AutozeroReport, Failure>,
 ) -> anyhow::Result<()> {
     let mut results = on_each_node(global, nodes, work)?;
     let reports: Vec<ZeroReport<'_>> =

@@ -44,7 +44,7 @@ mod tare;
 mod unit;
 
 use crate::bus::claim::{Claim, Claims};
-use crate::bus::interrupt::survive_file_size_limit;
+use crate::bus::interrupt::handle_file_size_limit;
 use crate::canopen::id::NodeId;
 use crate::master::{Master, OnTwoDevices, Timing};
 use crate::output;
@@ -447,7 +447,7 @@ impl Global {
 /// The failure of the command; [`exit::report`] converts it to text and an exit code.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
     let failed = |source| FileError { what: "watch for the file size limit".to_owned(), source };
-    survive_file_size_limit().map_err(failed)?;
+    handle_file_size_limit().map_err(failed)?;
     if cli.global.format.is_for_recordings() && !matches!(cli.command, Command::Log(_)) {
         let message = format!("--format {} is only for recordings (log)", cli.global.format.name());
         return Err(ErrorMessage::usage(message).into());

@@ -254,7 +254,7 @@ impl Unit {
     }
 
     /// Whether both units have the same zero point; degC and K do not.
-    pub fn has_zero_of(self, other: Unit) -> bool {
+    pub fn has_same_zero(self, other: Unit) -> bool {
         let zero = |unit: Unit| unit.scale().map(|(_, _, offset)| offset);
         self == other || zero(self) == zero(other)
     }

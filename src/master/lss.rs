@@ -9,12 +9,12 @@ mod scan;
 
 pub use error::LssError;
 
-use super::{Error, Happening, Master};
+use super::{Error, Master, MasterEvent};
 use crate::bus::{BusError, Fault, Filters, Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss::{Answer, Exchange, ExchangeError, LssAddress, LssRange, Mode, Part, Request, Service};
-use crate::canopen::nmt::Life;
+use crate::canopen::nmt::ErrorControlMessage;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -44,7 +44,7 @@ enum EndOfExchange {
 
 /// The answers of all slaves in configuration state to one request.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Gathered<T> {
+pub struct GatheredAnswers<T> {
     /// The different answers, in the order of arrival.
     pub answers: Vec<T>,
     /// Whether more than one slave answered: the answers differ, or there were more answers than requests.
@@ -53,7 +53,7 @@ pub struct Gathered<T> {
     pub faults: Vec<Fault>,
 }
 
-impl<T> Gathered<T> {
+impl<T> GatheredAnswers<T> {
     /// Whether there is one answer and no sign of a second slave.
     pub fn is_one(&self) -> bool {
         self.answers.len() == 1 && !self.has_several_slaves && !self.faults.iter().any(|fault| is_collision(*fault))
@@ -163,7 +163,7 @@ impl<'bus> Lss<'_, 'bus> {
     ///
     /// # Errors
     /// No slave answers, or an answer violates the protocol.
-    pub fn inquire(&mut self, part: Part) -> Result<Gathered<u32>, LssError> {
+    pub fn inquire(&mut self, part: Part) -> Result<GatheredAnswers<u32>, LssError> {
         self.gather(Request::Inquire(part), |answer| match answer {
             Answer::Number(number) => Some(number),
             _ => None,
@@ -174,7 +174,7 @@ impl<'bus> Lss<'_, 'bus> {
     ///
     /// # Errors
     /// No slave answers, or an answer violates the protocol.
-    pub fn inquire_node_id(&mut self) -> Result<Gathered<Option<NodeId>>, LssError> {
+    pub fn inquire_node_id(&mut self) -> Result<GatheredAnswers<Option<NodeId>>, LssError> {
         self.gather(Request::InquireNodeId, |answer| match answer {
             Answer::NodeId(node) => Some(node),
             _ => None,
@@ -296,7 +296,11 @@ impl<'bus> Lss<'_, 'bus> {
     }
 
     /// Carries out a service with all slaves in configuration state, and collects the different answers.
-    fn gather<T>(&mut self, request: Request, read: impl Fn(Answer) -> Option<T>) -> Result<Gathered<T>, LssError> {
+    fn gather<T>(
+        &mut self,
+        request: Request,
+        read: impl Fn(Answer) -> Option<T>,
+    ) -> Result<GatheredAnswers<T>, LssError> {
         let mut exchange = Exchange::new(request);
         let timeout = self.timeout_of(&exchange);
         self.carry_out(&mut exchange, EndOfExchange::Timeout, (timeout, self.master.timing.retries))?;
@@ -308,7 +312,7 @@ impl<'bus> Lss<'_, 'bus> {
         if answers.is_empty() && !self.faults.iter().any(|fault| is_collision(*fault)) {
             return Err(self.error(&exchange, ExchangeError::NoAnswer));
         }
-        Ok(Gathered {
+        Ok(GatheredAnswers {
             answers,
             has_several_slaves: exchange.has_several_slaves(),
             faults: std::mem::take(&mut self.faults),
@@ -418,7 +422,7 @@ impl<'bus> Lss<'_, 'bus> {
     fn next(&mut self, until: Mono) -> Result<Option<Received>, LssError> {
         loop {
             match self.master.next(until)? {
-                Happening::Frame(received) => {
+                MasterEvent::Frame(received) => {
                     let id = received.frame.id();
                     if id == CanId::LSS_SLAVE && !received.frame.is_remote() {
                         return Ok(Some(received));
@@ -426,19 +430,19 @@ impl<'bus> Lss<'_, 'bus> {
                     if id == CanId::LSS_MASTER && !received.frame.is_remote() {
                         return Err(LssError::Disturbed(received.frame));
                     }
-                    if let Some((node, Life::BootUp)) = Life::parse(&received.frame) {
+                    if let Some((node, ErrorControlMessage::BootUp)) = ErrorControlMessage::parse(&received.frame) {
                         self.boot_ups.insert(node, received.at);
                     }
                 }
-                Happening::Deadline => return Ok(None),
-                Happening::Fault(fault, _) if self.faults.len() < MAX_FAULTS => self.faults.push(fault),
-                Happening::Interrupted => return Err(Error::Interrupted.into()),
-                Happening::Link(false) => return Err(BusError::Down(self.master.bus.name().to_owned()).into()),
-                Happening::Sdo(..)
-                | Happening::Fault(..)
-                | Happening::Dropped(_)
-                | Happening::Link(true)
-                | Happening::Ended => {}
+                MasterEvent::Deadline => return Ok(None),
+                MasterEvent::Fault(fault, _) if self.faults.len() < MAX_FAULTS => self.faults.push(fault),
+                MasterEvent::Interrupted => return Err(Error::Interrupted.into()),
+                MasterEvent::Link(false) => return Err(BusError::Down(self.master.bus.name().to_owned()).into()),
+                MasterEvent::Sdo(..)
+                | MasterEvent::Fault(..)
+                | MasterEvent::Dropped(_)
+                | MasterEvent::Link(true)
+                | MasterEvent::Ended => {}
             }
         }
     }

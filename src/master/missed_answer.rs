@@ -4,7 +4,7 @@ use super::Master;
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::{Life, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtState};
 use crate::canopen::object::ObjectId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -137,12 +137,12 @@ impl MissedAnswers {
 
     /// Handles a frame with another COB-ID.
     pub(super) fn on_other_cob_id(&mut self, frame: &Frame, now: Mono) {
-        if let Some((node, life)) = Life::parse(frame) {
+        if let Some((node, life)) = ErrorControlMessage::parse(frame) {
             match life {
-                Life::State(state) => {
+                ErrorControlMessage::State(state) => {
                     self.states.insert(node, state);
                 }
-                Life::BootUp => {
+                ErrorControlMessage::BootUp => {
                     self.states.remove(&node);
                     self.boot_times.insert(node, now);
                 }

@@ -23,7 +23,7 @@ pub use lss::{Lss, LssError};
 pub use missed_answer::MissedAnswer;
 pub use request::{Answer, NUMBER_LIMIT, Operation, Request, SdoError, SdoFailure, TEXT_LIMIT, Ticket};
 pub use second_answer::{Answers, OnTwoDevices, SecondAnswer};
-pub use transcript::{Exchanged, Transcript};
+pub use transcript::{RecordedFrame, Transcript};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, TransferKind, read_object, write_object};
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
@@ -78,7 +78,7 @@ impl From<SdoError> for Error {
 
 /// An event that [`Master::next`] returns.
 #[derive(Debug)]
-pub enum Happening {
+pub enum MasterEvent {
     /// A frame that does not belong to our SDO transfers.
     Frame(Received),
     /// An SDO transfer has ended.
@@ -192,7 +192,7 @@ impl<'bus> Master<'bus> {
         self.listen(&Filters::Only(nodes.iter().flat_map(ids).chain([CanId::NMT, CanId::LSS_SLAVE]).collect()))
     }
 
-    /// Also returns the answers to our own transfers as [`Happening::Frame`].
+    /// Also returns the answers to our own transfers as [`MasterEvent::Frame`].
     pub fn deliver_own_answers(&mut self) {
         self.delivers_answers = true;
     }
@@ -219,9 +219,9 @@ impl<'bus> Master<'bus> {
         self.outgoing.remove_first()
     }
 
-    /// Returns the number of frames that the kernel dropped and that no event reported. See [`Bus::late_drops`].
-    pub fn late_drops(&mut self) -> u32 {
-        self.bus.late_drops()
+    /// Returns the number of frames that the kernel dropped and that no event reported. See [`Bus::unreported_drops`].
+    pub fn unreported_drops(&mut self) -> u32 {
+        self.bus.unreported_drops()
     }
 
     /// Sets whether an interface that is down and a bus without acknowledgement are tolerated. If so, frames that
@@ -230,7 +230,7 @@ impl<'bus> Master<'bus> {
         self.outgoing.set_tolerates_outages(tolerates_outages);
     }
 
-    /// Starts an SDO transfer. Its result comes as [`Happening::Sdo`] with the returned ticket. Each node has one
+    /// Starts an SDO transfer. Its result comes as [`MasterEvent::Sdo`] with the returned ticket. Each node has one
     /// transfer at a time; further transfers wait.
     pub fn start(&mut self, request: Request) -> Ticket {
         self.sdo.submit(request)
@@ -263,12 +263,12 @@ impl<'bus> Master<'bus> {
     pub(super) fn await_second_answers(&mut self, watch: &mut dyn FnMut(&Received)) -> Result<(), Error> {
         while let Some(until) = self.sdo.second_answer_until() {
             match self.next(until)? {
-                Happening::Frame(received) => watch(&received),
-                Happening::Deadline => self.sdo.on_waited(until),
-                Happening::Interrupted => return Err(Error::Interrupted),
-                Happening::Link(false) => return Err(Error::Bus(BusError::Down(self.bus.name().to_owned()))),
-                Happening::Ended => return Ok(()),
-                Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+                MasterEvent::Frame(received) => watch(&received),
+                MasterEvent::Deadline => self.sdo.on_waited(until),
+                MasterEvent::Interrupted => return Err(Error::Interrupted),
+                MasterEvent::Link(false) => return Err(Error::Bus(BusError::Down(self.bus.name().to_owned()))),
+                MasterEvent::Ended => return Ok(()),
+                MasterEvent::Sdo(..) | MasterEvent::Fault(..) | MasterEvent::Dropped(_) | MasterEvent::Link(true) => {}
             }
         }
         Ok(())
@@ -325,33 +325,33 @@ impl<'bus> Master<'bus> {
         }
     }
 
-    /// Waits for the next event. Returns [`Happening::Deadline`] when `until` is reached.
+    /// Waits for the next event. Returns [`MasterEvent::Deadline`] when `until` is reached.
     ///
     /// The receive time of a frame decides whether it is in time. So traffic never extends a deadline, and a slow
     /// program never shortens one.
     ///
     /// # Errors
     /// The bus failed.
-    pub fn next(&mut self, until: Mono) -> Result<Happening, Error> {
+    pub fn next(&mut self, until: Mono) -> Result<MasterEvent, Error> {
         self.next_or(until, until)
     }
 
     /// Returns the next event that was received by the moment `stop`, without waiting. Returns
-    /// [`Happening::Deadline`] if there is none.
+    /// [`MasterEvent::Deadline`] if there is none.
     ///
     /// Frames are accepted up to `DRAIN_LIMIT` after `stop`: receive times are inaccurate on a busy machine.
     ///
     /// # Errors
     /// The bus failed.
-    pub fn drain(&mut self, stop: Mono) -> Result<Happening, Error> {
+    pub fn drain(&mut self, stop: Mono) -> Result<MasterEvent, Error> {
         self.next_or(stop, stop + DRAIN_LIMIT)
     }
 
     /// Waits until `until`. Frames received up to `last` count as received before `until`.
-    fn next_or(&mut self, until: Mono, last: Mono) -> Result<Happening, Error> {
+    fn next_or(&mut self, until: Mono, last: Mono) -> Result<MasterEvent, Error> {
         loop {
             if let Some((ticket, result)) = self.sdo.pop_finished() {
-                return Ok(Happening::Sdo(ticket, result));
+                return Ok(MasterEvent::Sdo(ticket, result));
             }
             let retry_at = self.send_waiting()?;
             // A transfer to a node-ID with two devices ends before its request is sent.
@@ -377,7 +377,7 @@ impl<'bus> Master<'bus> {
                     self.seen = self.seen.max(at);
                     if at > last {
                         self.pending = Some(received);
-                        return Ok(Happening::Deadline);
+                        return Ok(MasterEvent::Deadline);
                     }
                     if let Some(transcript) = &mut self.outgoing.transcript {
                         transcript.push(at, false, received.frame);
@@ -386,21 +386,21 @@ impl<'bus> Master<'bus> {
                     if self.bypasses_sdo || !self.sdo.on_frame(&received, &self.timing, &mut self.outgoing) {
                         self.sdo.on_other_frame(&received.frame);
                         self.foreign_nmt = NmtCommand::parse(&received.frame).or(self.foreign_nmt);
-                        return Ok(Happening::Frame(received));
+                        return Ok(MasterEvent::Frame(received));
                     }
                     if self.delivers_answers {
-                        return Ok(Happening::Frame(received));
+                        return Ok(MasterEvent::Frame(received));
                     }
                 }
-                Event::Fault(fault, at) => return Ok(Happening::Fault(fault, at)),
-                Event::Dropped(count) => return Ok(Happening::Dropped(count)),
-                Event::Link(up) => return Ok(Happening::Link(up)),
-                Event::Interrupted => return Ok(Happening::Interrupted),
-                Event::Ended => return Ok(Happening::Ended),
+                Event::Fault(fault, at) => return Ok(MasterEvent::Fault(fault, at)),
+                Event::Dropped(count) => return Ok(MasterEvent::Dropped(count)),
+                Event::Link(up) => return Ok(MasterEvent::Link(up)),
+                Event::Interrupted => return Ok(MasterEvent::Interrupted),
+                Event::Ended => return Ok(MasterEvent::Ended),
                 Event::Timeout => {
                     self.sdo.on_time(deadline, &self.timing, &mut self.outgoing);
                     if deadline >= until && !self.sdo.has_finished() {
-                        return Ok(Happening::Deadline);
+                        return Ok(MasterEvent::Deadline);
                     }
                 }
             }
@@ -439,7 +439,7 @@ impl<'bus> Master<'bus> {
         let far = Mono::at(Duration::MAX);
         while results.iter().any(Option::is_none) {
             match self.next(far)? {
-                Happening::Sdo(ticket, result) => {
+                MasterEvent::Sdo(ticket, result) => {
                     let Some(index) = tickets.iter().position(|&own| own == ticket) else { continue };
                     let silent =
                         result.as_ref().err().filter(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }));
@@ -454,20 +454,20 @@ impl<'bus> Master<'bus> {
                     }
                     results[index] = Some(result);
                 }
-                Happening::Frame(received) => watch(&received),
-                Happening::Interrupted => {
+                MasterEvent::Frame(received) => watch(&received),
+                MasterEvent::Interrupted => {
                     self.cancel();
                     return Err(Error::Interrupted);
                 }
-                Happening::Link(false) => {
+                MasterEvent::Link(false) => {
                     self.cancel();
                     return Err(Error::Bus(BusError::Down(self.bus.name().to_owned())));
                 }
-                Happening::Fault(..)
-                | Happening::Dropped(_)
-                | Happening::Link(true)
-                | Happening::Ended
-                | Happening::Deadline => {}
+                MasterEvent::Fault(..)
+                | MasterEvent::Dropped(_)
+                | MasterEvent::Link(true)
+                | MasterEvent::Ended
+                | MasterEvent::Deadline => {}
             }
         }
         if targets.iter().any(|(_, _, operation)| *operation == Operation::Read) {

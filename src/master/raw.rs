@@ -1,6 +1,6 @@
 //! Sends requests that no state machine sends: with a wrong command, a wrong toggle bit, a wrong length.
 
-use super::{Error, Happening, Master};
+use super::{Error, Master, MasterEvent};
 use crate::bus::{BusError, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
@@ -32,7 +32,7 @@ impl Master<'_> {
         self.outside_sdo(|master| {
             let now = master.now();
             while let Some(event) = master.next_raw(now)? {
-                if let Happening::Frame(received) = event {
+                if let MasterEvent::Frame(received) = event {
                     watch(&received);
                 }
             }
@@ -63,7 +63,7 @@ impl Master<'_> {
         let until = self.now() + timeout;
         loop {
             match self.next_raw(until)? {
-                Some(Happening::Frame(received)) => {
+                Some(MasterEvent::Frame(received)) => {
                     watch(&received);
                     if received.frame.id() == answer && !received.frame.is_remote() {
                         return Ok(Some(received));
@@ -76,11 +76,11 @@ impl Master<'_> {
     }
 
     /// Returns the next event; `None` at the deadline.
-    fn next_raw(&mut self, until: crate::bus::Mono) -> Result<Option<Happening>, Error> {
+    fn next_raw(&mut self, until: crate::bus::Mono) -> Result<Option<MasterEvent>, Error> {
         match self.next(until)? {
-            Happening::Deadline | Happening::Ended => Ok(None),
-            Happening::Interrupted => Err(Error::Interrupted),
-            Happening::Link(false) => Err(Error::Bus(BusError::Down(self.bus.name().to_owned()))),
+            MasterEvent::Deadline | MasterEvent::Ended => Ok(None),
+            MasterEvent::Interrupted => Err(Error::Interrupted),
+            MasterEvent::Link(false) => Err(Error::Bus(BusError::Down(self.bus.name().to_owned()))),
             event => Ok(Some(event)),
         }
     }

@@ -6,7 +6,7 @@ use super::Master;
 use crate::bus::{Mono, Received};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss::Fastscan;
-use crate::canopen::nmt::Life;
+use crate::canopen::nmt::ErrorControlMessage;
 
 /// The times of the last frames of one node.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,7 +43,7 @@ impl ReceiveTimes {
         let (frame, at) = (&received.frame, received.at.mono);
         if let Some(node) = frame.id().sdo_response_node() {
             self.node(node).answer = Some(at);
-        } else if let Some((node, _)) = Life::parse(frame) {
+        } else if let Some((node, _)) = ErrorControlMessage::parse(frame) {
             self.node(node).heartbeat = Some(at);
         } else if frame.id() == CanId::LSS_SLAVE && Fastscan::is_answer(frame) {
             self.fastscan = Some(at);

@@ -14,9 +14,9 @@ use super::send::Outgoing;
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::Life;
+use crate::canopen::nmt::ErrorControlMessage;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, TransferError, proves_60};
+use crate::canopen::sdo::{AbortCode, TransferError, proves_upload_answer_60};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
@@ -67,7 +67,7 @@ pub(super) struct SdoClient {
 impl SdoClient {
     /// Records a heartbeat of another length than one byte.
     pub(super) fn on_other_frame(&mut self, frame: &Frame) {
-        if let Some((node, length)) = Life::unusual_length(frame) {
+        if let Some((node, length)) = ErrorControlMessage::unusual_length(frame) {
             self.unusual_heartbeats.entry(node).or_insert(length);
         }
     }
@@ -229,7 +229,7 @@ impl SdoClient {
         } else if !is_stale {
             self.missed_answers.on_channel(number, &received.frame, received.at.mono);
         }
-        node.accept_60 |= is_ours && proves_60(&received.frame);
+        node.accept_60 |= is_ours && proves_upload_answer_60(&received.frame);
         self.due = earlier(self.due, node.active.as_ref().and_then(|active| active.deadline));
         self.can_start |= node.active.is_none() && !node.waiting.is_empty();
         is_ours

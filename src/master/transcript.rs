@@ -9,7 +9,7 @@ const MAX_FRAMES: usize = 200;
 
 /// A frame on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Exchanged {
+pub struct RecordedFrame {
     /// When the frame was passed to the bus or received.
     pub at: Mono,
     /// Whether this program sent it.
@@ -22,7 +22,7 @@ pub struct Exchanged {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Transcript {
     /// The first frames, at most 200.
-    pub frames: Vec<Exchanged>,
+    pub frames: Vec<RecordedFrame>,
     /// The number of later frames, which are not stored.
     pub omitted: usize,
 }
@@ -30,7 +30,7 @@ pub struct Transcript {
 impl Transcript {
     pub(super) fn push(&mut self, at: Mono, is_sent: bool, frame: Frame) {
         if self.frames.len() < MAX_FRAMES {
-            self.frames.push(Exchanged { at, is_sent, frame });
+            self.frames.push(RecordedFrame { at, is_sent, frame });
         } else {
             self.omitted += 1;
         }

@@ -13,7 +13,7 @@
 //! support block transfer. So it is used only if it saves frames: see [`BlockMode::Auto`].
 
 use super::request::NUMBER_LIMIT;
-use super::{Answer, Error, Happening, Master, Operation, Request, SdoError, SdoFailure, Ticket};
+use super::{Answer, Error, Master, MasterEvent, Operation, Request, SdoError, SdoFailure, Ticket};
 use crate::bus::{BusError, Received};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -176,7 +176,7 @@ impl Master<'_> {
         let mut has_updated_clock = false;
         loop {
             match self.next(report_at)? {
-                Happening::Sdo(ended, result) if ended == ticket => {
+                MasterEvent::Sdo(ended, result) if ended == ticket => {
                     if operation == Operation::Read {
                         self.await_second_answers(watch)?;
                     }
@@ -185,8 +185,8 @@ impl Master<'_> {
                         None => Ok(answer),
                     }));
                 }
-                Happening::Frame(received) => watch(&received),
-                Happening::Deadline => {
+                MasterEvent::Frame(received) => watch(&received),
+                MasterEvent::Deadline => {
                     // The first deadline only updates the clock.
                     if let Some(moved) = self.moved(ticket).filter(|_| has_updated_clock) {
                         progress(moved);
@@ -194,11 +194,11 @@ impl Master<'_> {
                     has_updated_clock = true;
                     report_at = self.now() + REPORT_INTERVAL;
                 }
-                Happening::Interrupted => {
+                MasterEvent::Interrupted => {
                     self.cancel();
                     return Err(Error::Interrupted);
                 }
-                Happening::Link(false) => {
+                MasterEvent::Link(false) => {
                     self.cancel();
                     return Err(Error::Bus(BusError::Down(self.bus().name().to_owned())));
                 }

@@ -6,7 +6,7 @@ use super::sample::{Sample, Source};
 use crate::bus::Received;
 use crate::canopen::id::{CanId, CanIdMap, NodeId};
 use crate::canopen::object::ObjectId;
-use crate::canopen::pdo::{Field, TpdoNumber, lay_out};
+use crate::canopen::pdo::{Field, TpdoNumber, field_layout};
 use crate::canopen::value::DataType;
 use crate::device::unit::Unit;
 use std::collections::{BTreeMap, BTreeSet};
@@ -239,7 +239,7 @@ impl Decoder {
     }
 
     fn tpdo_decoder(&mut self, layout: Layout<'_>, tpdo: &Tpdo, wanted: &[Wanted]) -> TpdoDecoder {
-        let fields = lay_out(&tpdo.mapping);
+        let fields = field_layout(&tpdo.mapping);
         let bits: usize = fields.iter().map(|field| usize::from(field.entry.bits)).sum();
         let mut values = Vec::new();
         for field in &fields {

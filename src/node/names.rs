@@ -80,7 +80,7 @@ impl Node {
     }
 
     /// Returns the object of a signal in the family of its process value. `low` is the index without its first digit.
-    pub fn in_family(&self, signal: &Signal, low: u16) -> ObjectId {
+    pub fn object_in_family(&self, signal: &Signal, low: u16) -> ObjectId {
         ObjectId::new(signal.value_object.0.index & 0xf000 | low, signal.channel)
     }
 

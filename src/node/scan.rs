@@ -5,9 +5,9 @@ use super::wait::{Policy, wait};
 use crate::bus::{Fault, Filters, Mono, Received};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::{CanId, NodeId};
-use crate::canopen::nmt::{Life, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtState};
 use crate::canopen::object::ObjectId;
-use crate::master::{Answer, Error, Happening, Master, Request, SdoError, SdoFailure, Ticket};
+use crate::master::{Answer, Error, Master, MasterEvent, Request, SdoError, SdoFailure, Ticket};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -56,10 +56,10 @@ impl Presence {
         self.states.get(&node).copied().flatten()
     }
 
-    fn on_event(&mut self, event: &Happening) {
+    fn on_event(&mut self, event: &MasterEvent) {
         match event {
-            Happening::Frame(received) => self.on_frame(received),
-            Happening::Fault(fault, _) => self.on_fault(*fault),
+            MasterEvent::Frame(received) => self.on_frame(received),
+            MasterEvent::Fault(fault, _) => self.on_fault(*fault),
             _ => {}
         }
     }
@@ -86,11 +86,11 @@ impl Presence {
     }
 
     fn on_frame(&mut self, received: &Received) {
-        match Life::parse(&received.frame) {
-            Some((node, Life::State(state))) => {
+        match ErrorControlMessage::parse(&received.frame) {
+            Some((node, ErrorControlMessage::State(state))) => {
                 self.states.insert(node, Some(state));
             }
-            Some((node, Life::BootUp)) => {
+            Some((node, ErrorControlMessage::BootUp)) => {
                 self.states.entry(node).or_insert(None);
                 self.booted.insert(node);
             }
@@ -188,7 +188,9 @@ fn ask(
         let step = if is_sending { master.now() + SENDING_STEP } else { until };
         let waited = wait(master, step, Policy::Command, |master, event| {
             match event {
-                Happening::Sdo(ticket, result) => presence.on_result(result, pending.remove(&ticket), nodes.len() == 1),
+                MasterEvent::Sdo(ticket, result) => {
+                    presence.on_result(result, pending.remove(&ticket), nodes.len() == 1)
+                }
                 event => presence.on_event(&event),
             }
             let is_sent = is_sending && !master.is_sending();
@@ -230,7 +232,7 @@ pub fn listen(master: &mut Master<'_>, duration: Duration) -> Result<Presence, E
     let until = master.now() + duration;
     wait(master, until, Policy::Observe, |_, event| {
         match event {
-            Happening::Frame(received) => presence.on_any_frame(&received),
+            MasterEvent::Frame(received) => presence.on_any_frame(&received),
             event => presence.on_event(&event),
         }
         ControlFlow::<()>::Continue(())

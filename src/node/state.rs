@@ -10,10 +10,10 @@ use super::wait::{Policy, wait};
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
-use crate::canopen::nmt::{Life, NmtCommand, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
-use crate::master::{Error as MasterError, Happening, Master, Request, SdoFailure};
+use crate::master::{Error as MasterError, Master, MasterEvent, Request, SdoFailure};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -85,10 +85,10 @@ impl StateReport {
         StateReport { node, state: None, by: Proof::None, is_present }
     }
 
-    fn of_life(node: NodeId, life: Life) -> StateReport {
+    fn of_life(node: NodeId, life: ErrorControlMessage) -> StateReport {
         match life {
-            Life::State(state) => StateReport::known(node, state, Proof::Heartbeat),
-            Life::BootUp => StateReport { node, state: None, by: Proof::BootUp, is_present: true },
+            ErrorControlMessage::State(state) => StateReport::known(node, state, Proof::Heartbeat),
+            ErrorControlMessage::BootUp => StateReport { node, state: None, by: Proof::BootUp, is_present: true },
         }
     }
 }
@@ -111,19 +111,19 @@ impl StateSources {
 
 /// Heartbeats, boot-ups and guarding requests received while waiting.
 #[derive(Default)]
-pub struct LifeWatch {
+pub struct ErrorControlWatch {
     /// The last heartbeat or boot-up message of each node.
-    pub lives: BTreeMap<NodeId, Life>,
+    pub lives: BTreeMap<NodeId, ErrorControlMessage>,
     booted: BTreeSet<NodeId>,
     guarded_by_others: BTreeSet<NodeId>,
 }
 
-impl LifeWatch {
+impl ErrorControlWatch {
     /// Handles a received frame.
     pub fn on_frame(&mut self, received: &Received) {
-        if let Some((node, life)) = Life::parse(&received.frame) {
+        if let Some((node, life)) = ErrorControlMessage::parse(&received.frame) {
             self.lives.insert(node, life);
-            if life == Life::BootUp {
+            if life == ErrorControlMessage::BootUp {
                 self.booted.insert(node);
             }
         } else if let (Some(node), true) = (received.frame.id().heartbeat_node(), received.frame.is_remote()) {
@@ -134,8 +134,8 @@ impl LifeWatch {
     /// Returns the state that the last heartbeat of a node showed.
     pub fn state(&self, node: NodeId) -> Option<NmtState> {
         match self.lives.get(&node) {
-            Some(Life::State(state)) => Some(*state),
-            Some(Life::BootUp) | None => None,
+            Some(ErrorControlMessage::State(state)) => Some(*state),
+            Some(ErrorControlMessage::BootUp) | None => None,
         }
     }
 
@@ -147,13 +147,13 @@ impl LifeWatch {
         &mut self,
         master: &mut Master<'_>,
         until: Mono,
-        is_enough: &dyn Fn(&LifeWatch) -> bool,
+        is_enough: &dyn Fn(&ErrorControlWatch) -> bool,
     ) -> Result<(), MasterError> {
         if is_enough(self) {
             return Ok(());
         }
         wait(master, until, Policy::Command, |_, event| {
-            if let Happening::Frame(received) = event {
+            if let MasterEvent::Frame(received) = event {
                 self.on_frame(&received);
                 if is_enough(self) {
                     return ControlFlow::Break(());
@@ -199,7 +199,7 @@ fn sources(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId,
 /// # Errors
 /// Bus errors and Ctrl-C. A node that sends and answers nothing has `is_present: false`.
 pub fn states(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<StateReport>, MasterError> {
-    let mut watch = LifeWatch::default();
+    let mut watch = ErrorControlWatch::default();
     let sources = sources(master, nodes)?;
     let timeout = master.timing().timeout;
     let longest = nodes.iter().filter_map(|node| sources[node].heartbeat).max();
@@ -229,7 +229,7 @@ pub fn state(master: &mut Master<'_>, node: NodeId) -> Result<Option<NmtState>, 
 /// # Errors
 /// Bus errors and Ctrl-C.
 pub fn by_heartbeat(master: &mut Master<'_>, node: NodeId, period: Duration) -> Result<Option<NmtState>, MasterError> {
-    let mut watch = LifeWatch::default();
+    let mut watch = ErrorControlWatch::default();
     let until = master.now() + period + master.timing().timeout;
     watch.wait(master, until, &|watch| watch.state(node).is_some())?;
     Ok(watch.state(node))
@@ -240,7 +240,7 @@ fn guard(
     master: &mut Master<'_>,
     nodes: &[NodeId],
     sources: &BTreeMap<NodeId, StateSources>,
-    watch: &mut LifeWatch,
+    watch: &mut ErrorControlWatch,
 ) -> Result<BTreeMap<NodeId, NmtState>, MasterError> {
     let may_guard = |node: &NodeId| sources[node].may_guard && sources[node].heartbeat.is_none();
     let asked: Vec<NodeId> = nodes.iter().copied().filter(may_guard).collect();
@@ -250,7 +250,8 @@ fn guard(
     }
     // With two masters, each would get an answer with the toggle bit that the other master expects.
     let until = master.now() + OTHER_GUARD_TIMEOUT.min(master.timing().timeout);
-    let is_known = |watch: &LifeWatch, node| watch.guarded_by_others.contains(node) && watch.lives.contains_key(node);
+    let is_known =
+        |watch: &ErrorControlWatch, node| watch.guarded_by_others.contains(node) && watch.lives.contains_key(node);
     watch.wait(master, until, &|watch| asked.iter().all(|node| is_known(watch, node)))?;
     let asked: Vec<NodeId> = asked.into_iter().filter(|node| !watch.guarded_by_others.contains(node)).collect();
     for node in &asked {
@@ -275,7 +276,7 @@ pub fn command(
     nodes: &[NodeId],
     broadcast: bool,
 ) -> Result<Vec<StateReport>, MasterError> {
-    let mut watch = LifeWatch::default();
+    let mut watch = ErrorControlWatch::default();
     let before = sources(master, nodes)?;
     if broadcast {
         master.send(command.frame(None));
@@ -291,7 +292,11 @@ pub fn command(
 }
 
 /// Waits for the boot-up messages after a reset.
-fn wait_for_boot_ups(master: &mut Master<'_>, nodes: &[NodeId], watch: &mut LifeWatch) -> Result<(), MasterError> {
+fn wait_for_boot_ups(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    watch: &mut ErrorControlWatch,
+) -> Result<(), MasterError> {
     let until = master.now() + BOOT_TIMEOUT.max(master.timing().timeout);
     watch.wait(master, until, &|watch| nodes.iter().all(|node| watch.booted.contains(node)))
 }
@@ -301,12 +306,12 @@ fn after_reset(
     master: &mut Master<'_>,
     nodes: &[NodeId],
     before: &BTreeMap<NodeId, StateSources>,
-    watch: &mut LifeWatch,
+    watch: &mut ErrorControlWatch,
 ) -> Result<Vec<StateReport>, MasterError> {
     let expected: Vec<NodeId> = nodes.iter().copied().filter(|node| watch.booted.contains(node)).collect();
     if let Some(longest) = expected.iter().filter_map(|node| before[node].heartbeat).max() {
         let has_state =
-            |watch: &LifeWatch, node: &NodeId| before[node].heartbeat.is_none() || watch.state(*node).is_some();
+            |watch: &ErrorControlWatch, node: &NodeId| before[node].heartbeat.is_none() || watch.state(*node).is_some();
         let until = master.now() + longest + master.timing().timeout;
         watch.wait(master, until, &|watch| expected.iter().all(|node| has_state(watch, node)))?;
     }
@@ -325,10 +330,10 @@ fn after_change(
     command: NmtCommand,
     nodes: &[NodeId],
     before: &BTreeMap<NodeId, StateSources>,
-    watch: &mut LifeWatch,
+    watch: &mut ErrorControlWatch,
 ) -> Result<Vec<StateReport>, MasterError> {
     let sent = master.now();
-    let target = Life::State(command.target());
+    let target = ErrorControlMessage::State(command.target());
     let expected: Vec<NodeId> = nodes.iter().copied().filter(|node| before[node].may_send_heartbeat()).collect();
     if !expected.is_empty() {
         let longest = nodes.iter().filter_map(|node| before[node].heartbeat).max().unwrap_or_default();
@@ -367,7 +372,7 @@ fn after_change(
 /// # Errors
 /// [`Error::NoBootUp`]; bus errors and Ctrl-C.
 pub fn reset(master: &mut Master<'_>, node: NodeId) -> Result<(), Error> {
-    let mut watch = LifeWatch::default();
+    let mut watch = ErrorControlWatch::default();
     master.send(NmtCommand::ResetNode.frame(Some(node)));
     wait_for_boot_ups(master, &[node], &mut watch)?;
     if watch.booted.contains(&node) { Ok(()) } else { Err(Error::NoBootUp(node)) }

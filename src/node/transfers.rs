@@ -9,7 +9,7 @@ use crate::bus::{Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, Uploaded, Violation, multiplexer, proves_60};
+use crate::canopen::sdo::{AbortCode, Uploaded, Violation, multiplexer, proves_upload_answer_60};
 pub use crate::master::Operation;
 use crate::master::{Answers, SecondAnswer};
 use open::{Open, Step};
@@ -216,7 +216,7 @@ impl Transfers {
         if is_first {
             self.on_first_answer(index, received);
         }
-        if self.open[index].object == ObjectId::DEVICE_TYPE && proves_60(frame) {
+        if self.open[index].object == ObjectId::DEVICE_TYPE && proves_upload_answer_60(frame) {
             self.answers_60.insert(node);
         }
         // Segments or blocks follow.

@@ -12,7 +12,7 @@
 //! transfers, faults and drop counts are given to the caller in the order of reception.
 
 use crate::bus::{BusError, Mono};
-use crate::master::{Error, Happening, Master};
+use crate::master::{Error, Master, MasterEvent};
 use std::ops::ControlFlow;
 
 /// Which events end a wait before its deadline.
@@ -70,15 +70,18 @@ pub trait Waiter {
     /// How long to wait for the next event. Called before each event.
     fn until(&self) -> Until;
 
-    /// Handles an event: a frame, the end of an SDO transfer, a fault, a drop count, or [`Happening::Ended`].
+    /// Handles an event: a frame, the end of an SDO transfer, a fault, a drop count, or [`MasterEvent::Ended`].
     ///
-    /// [`Happening::Deadline`] is the end of the time in [`Waiter::until`]. The policy decides whether
-    /// [`Happening::Interrupted`] and [`Happening::Link`] are passed.
+    /// [`MasterEvent::Deadline`] is the end of the time in [`Waiter::until`]. The policy decides whether
+    /// [`MasterEvent::Interrupted`] and [`MasterEvent::Link`] are passed.
     ///
     /// # Errors
     /// An error ends the wait.
-    fn on_event(&mut self, master: &mut Master<'_>, event: Happening)
-    -> Result<ControlFlow<Self::Output>, Self::Error>;
+    fn on_event(
+        &mut self,
+        master: &mut Master<'_>,
+        event: MasterEvent,
+    ) -> Result<ControlFlow<Self::Output>, Self::Error>;
 }
 
 /// Waits until the waiter breaks or fails, or the policy ends the wait.
@@ -109,11 +112,11 @@ pub fn wait<T>(
     master: &mut Master<'_>,
     until: Mono,
     policy: Policy,
-    on_event: impl FnMut(&mut Master<'_>, Happening) -> ControlFlow<T>,
+    on_event: impl FnMut(&mut Master<'_>, MasterEvent) -> ControlFlow<T>,
 ) -> Result<Waited<T>, Error> {
     struct Simple<F>(Mono, F);
 
-    impl<T, F: FnMut(&mut Master<'_>, Happening) -> ControlFlow<T>> Waiter for Simple<F> {
+    impl<T, F: FnMut(&mut Master<'_>, MasterEvent) -> ControlFlow<T>> Waiter for Simple<F> {
         type Output = Waited<T>;
         type Error = Error;
 
@@ -121,11 +124,11 @@ pub fn wait<T>(
             Until::Deadline(self.0)
         }
 
-        fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<Waited<T>>, Error> {
+        fn on_event(&mut self, master: &mut Master<'_>, event: MasterEvent) -> Result<ControlFlow<Waited<T>>, Error> {
             Ok(match event {
-                Happening::Deadline => ControlFlow::Break(Waited::Deadline),
-                Happening::Ended => ControlFlow::Break(Waited::Ended),
-                Happening::Interrupted => ControlFlow::Break(Waited::Interrupted),
+                MasterEvent::Deadline => ControlFlow::Break(Waited::Deadline),
+                MasterEvent::Ended => ControlFlow::Break(Waited::Ended),
+                MasterEvent::Interrupted => ControlFlow::Break(Waited::Interrupted),
                 event => match (self.1)(master, event) {
                     ControlFlow::Break(result) => ControlFlow::Break(Waited::Done(result)),
                     ControlFlow::Continue(()) => ControlFlow::Continue(()),
@@ -146,13 +149,13 @@ pub fn pause(master: &mut Master<'_>, until: Mono, policy: Policy) -> Result<(),
 }
 
 /// Turns an event into an error if the policy requires it.
-fn apply(master: &mut Master<'_>, policy: Policy, event: Happening) -> Result<Happening, Error> {
+fn apply(master: &mut Master<'_>, policy: Policy, event: MasterEvent) -> Result<MasterEvent, Error> {
     match (event, policy) {
-        (Happening::Interrupted, Policy::Command | Policy::Reconnect) => {
+        (MasterEvent::Interrupted, Policy::Command | Policy::Reconnect) => {
             master.cancel();
             Err(Error::Interrupted)
         }
-        (Happening::Link(false), Policy::Command | Policy::Observe) => {
+        (MasterEvent::Link(false), Policy::Command | Policy::Observe) => {
             master.cancel();
             Err(Error::Bus(BusError::Down(master.bus().name().to_owned())))
         }

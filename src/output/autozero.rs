@@ -3,7 +3,7 @@
 use super::notes::NoteText;
 use super::report::{Cell, Column, Report};
 use crate::canopen::id::NodeId;
-use crate::tasks::autozero::Zeroed;
+use crate::tasks::autozero::AutozeroReport;
 use std::io::{self, Write};
 
 /// A channel of a node that was set to zero.
@@ -12,7 +12,7 @@ pub struct ZeroReport<'a> {
     /// The node.
     pub node: NodeId,
     /// The result.
-    pub zeroed: &'a Zeroed,
+    pub zeroed: &'a AutozeroReport,
 }
 
 impl Report for ZeroReport<'_> {
@@ -55,13 +55,13 @@ impl Report for ZeroReport<'_> {
 }
 
 /// Half of the last decimal digit in the table.
-fn half_digit(zeroed: &Zeroed) -> f64 {
+fn half_digit(zeroed: &AutozeroReport) -> f64 {
     i32::try_from(zeroed.decimals).map_or(0.0, |decimals| 0.5 * 10f64.powi(-decimals))
 }
 
 /// The cells of `1 pressure 0.013 -> 0.000 bar shift -0.013 bar offset 0.0 -> -0.013`. If nothing was changed, there is
 /// no shift and no new offset.
-fn table_row(node: NodeId, zeroed: &Zeroed) -> Vec<String> {
+fn table_row(node: NodeId, zeroed: &AutozeroReport) -> Vec<String> {
     // A number that rounds to zero is printed without a sign.
     let number =
         |number: f64| format!("{:.*}", zeroed.decimals, if number.abs() < half_digit(zeroed) { 0.0 } else { number });

@@ -5,7 +5,7 @@ use super::table::{self, Align};
 use super::{notes, text};
 use crate::canopen::value::DataType;
 use crate::device::config_file::{Item, toml_key, toml_value};
-use crate::tasks::config::{Applied, ChangedRow, Dump, Line, Row, Step};
+use crate::tasks::config::{ApplyReport, ChangedRow, Dump, Line, Row, Step};
 use std::io::{self, Write};
 
 /// Converts a value to a cell.
@@ -130,12 +130,12 @@ impl Report for ChangedSetting {
 
 /// The result of `config apply` for one device.
 #[derive(Clone, Debug)]
-pub struct AppliedReport(pub Applied);
+pub struct AppliedReport(pub ApplyReport);
 
 impl AppliedReport {
     /// `4 changes, verified and stored`.
     pub fn sentence(&self) -> String {
-        let Applied { rows, stored, is_reset, .. } = &self.0;
+        let ApplyReport { rows, stored, is_reset, .. } = &self.0;
         let changes = match rows.len() {
             1 => "1 change".to_owned(),
             count => format!("{count} changes"),
@@ -163,7 +163,7 @@ impl Report for AppliedReport {
     ];
 
     fn cells(&self) -> Vec<Cell> {
-        let Applied { after, rows, stored, is_reset, notes, .. } = &self.0;
+        let ApplyReport { after, rows, stored, is_reset, notes, .. } = &self.0;
         vec![
             self.0.node.into(),
             after.node.identity.serial.into(),

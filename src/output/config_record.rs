@@ -2,7 +2,7 @@
 
 use super::text;
 use crate::bus::Wall;
-use crate::tasks::config::{Applied, Row, Snapshot};
+use crate::tasks::config::{ApplyReport, Row, Snapshot};
 use serde_json::{Map, Value, json};
 
 /// The record of one run.
@@ -15,7 +15,7 @@ pub struct ConfigRecord<'a> {
     /// The file with the settings.
     pub file: String,
     /// The configured devices.
-    pub done: Vec<&'a Applied>,
+    pub done: Vec<&'a ApplyReport>,
     /// The messages about failed devices.
     pub failed: Vec<String>,
 }
@@ -65,7 +65,7 @@ impl ConfigRecord<'_> {
     }
 }
 
-fn verification(applied: &Applied) -> &'static str {
+fn verification(applied: &ApplyReport) -> &'static str {
     match (applied.stored, applied.is_reset) {
         (true, true) => "stored, and every setting read again after a reset",
         (true, false) => "every setting read back; the device acknowledged the store",
@@ -78,7 +78,7 @@ fn settings(snapshot: &Snapshot) -> Value {
     Value::Object(snapshot.dump(false).rows.into_iter().map(row).collect::<Map<_, _>>())
 }
 
-fn device(applied: &Applied) -> Value {
+fn device(applied: &ApplyReport) -> Value {
     let (identity, kind) = (&applied.after.node.identity, applied.after.kind());
     let dates: Map<String, Value> = kind.dates.iter().map(|(what, date)| ((*what).to_owned(), json!(date))).collect();
     let text = |item: &Option<crate::device::config_file::Item>| item.as_ref().map(ToString::to_string);
@@ -99,7 +99,7 @@ fn device(applied: &Applied) -> Value {
     })
 }
 
-fn section(applied: &Applied) -> String {
+fn section(applied: &ApplyReport) -> String {
     let (identity, kind) = (&applied.after.node.identity, applied.after.kind());
     let number = |number: Option<u32>| number.map_or_else(|| "unknown".to_owned(), |number| number.to_string());
     let mut html = format!(

@@ -12,7 +12,7 @@ use words::page;
 use super::report::{Cell, Column, Report};
 use super::text;
 use crate::canopen::id::NodeId;
-use crate::tasks::conform::{Case, CaseResult, ConformReport, Exchanged, StateAfter, Transcript, Verdict};
+use crate::tasks::conform::{Case, CaseResult, ConformReport, RecordedFrame, StateAfter, Transcript, Verdict};
 use std::io::{self, Write};
 
 /// One case in the list of `--dry-run`.
@@ -53,7 +53,7 @@ pub struct ResultRow {
 
 /// The frames as in `candump`: `>` for sent ones.
 fn frames(transcript: &Transcript) -> Vec<String> {
-    let frame = |one: &Exchanged| format!("{} {}", if one.is_sent { '>' } else { '<' }, one.frame);
+    let frame = |one: &RecordedFrame| format!("{} {}", if one.is_sent { '>' } else { '<' }, one.frame);
     transcript.frames.iter().map(frame).collect()
 }
 

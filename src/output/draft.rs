@@ -56,7 +56,7 @@ fn unused_name(name: &str, fallback: &str, used: &mut BTreeSet<String>) -> Strin
     let words: String = name.chars().map(plain).collect();
     let words: Vec<&str> = words.split('-').filter(|word| !word.is_empty()).collect();
     let mut name = words.join("-");
-    if name.is_empty() || ObjectId::reads_as_address(&name) {
+    if name.is_empty() || ObjectId::looks_like_address(&name) {
         name = fallback.to_owned();
     }
     let base = name.clone();

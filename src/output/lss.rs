@@ -7,8 +7,8 @@ use super::report::{Cell, Column, Report};
 use crate::canopen::id::NodeId;
 use crate::device::assign::short_bit_rate;
 use crate::tasks::lss::{
-    AnotherSlave, Assigned, DuplicateSign, FoundSlave, Inquired, LssAddress, LssEvent, LssFact, LssRange, PlannedRate,
-    Progress, Reason, Stage, UnansweredService,
+    AnotherSlave, Assigned, DuplicateSign, FoundSlave, InquireReport, LssAddress, LssEvent, LssFact, LssRange,
+    PlannedRate, Progress, Reason, Stage, UnansweredService,
 };
 use std::io::{self, Write};
 
@@ -36,7 +36,7 @@ impl Report for FoundSlave {
     }
 }
 
-impl Report for Inquired {
+impl Report for InquireReport {
     const COLUMNS: &'static [Column] = &[
         Column::new("target").data_only(),
         Column::new("node"),

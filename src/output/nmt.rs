@@ -2,7 +2,7 @@
 
 use super::report::{Cell, Column, Report, rows_only};
 use crate::bus::time::format_duration;
-use crate::tasks::nmt::{Change, LeftHeartbeat, Starts, StartupReport, StateEvent, StateReport};
+use crate::tasks::nmt::{Change, Starts, StartupReport, StateEvent, StateReport, UnrestoredHeartbeat};
 use std::io::{self, Write};
 
 impl Report for StateReport {
@@ -67,7 +67,7 @@ fn word(report: &StartupReport) -> String {
 }
 
 /// The warning about a heartbeat time that a probe could not restore.
-pub fn left_heartbeat(left: LeftHeartbeat) -> String {
+pub fn left_heartbeat(left: UnrestoredHeartbeat) -> String {
     let verb = if left.is_certain { "stays" } else { "may stay" };
     format!("1017h {verb} at {} ms; it was {} ms", left.milliseconds, left.before)
 }

@@ -10,7 +10,7 @@ use super::failure::{self, autozero, config, conform, pdo, settings, store};
 use super::report::Cell;
 use super::{lss, objects};
 use crate::canopen::id::NodeId;
-use crate::tasks::journal::{TemporaryWrite, Undone};
+use crate::tasks::journal::{TemporaryWrite, UndoResult};
 use crate::tasks::note::{Rule, StateEffect};
 use crate::tasks::{Effect, Fact, Note};
 use serde::Serialize;
@@ -174,14 +174,14 @@ pub fn print(console: &Console, note: &Note) {
 }
 
 /// The warning about a temporary write that an earlier run left behind.
-pub fn undone_text(write: &TemporaryWrite, undone: Undone) -> String {
+pub fn undone_text(write: &TemporaryWrite, undone: UndoResult) -> String {
     let TemporaryWrite { node, object, .. } = write;
     let [before, written] = [&write.before, &write.written].map(|bytes| value_text(bytes));
     let what = match undone {
-        Undone::Restored => format!("restored to {before}"),
-        Undone::ChangedSince => "it has another value now and was not changed".to_owned(),
-        Undone::OtherDevice => "another device has this node-ID now: nothing was changed".to_owned(),
-        Undone::NotRestored => format!("it could not be restored to {before}"),
+        UndoResult::Restored => format!("restored to {before}"),
+        UndoResult::ChangedSince => "it has another value now and was not changed".to_owned(),
+        UndoResult::OtherDevice => "another device has this node-ID now: nothing was changed".to_owned(),
+        UndoResult::NotRestored => format!("it could not be restored to {before}"),
     };
     format!("node {node}: an earlier run was killed and left {object} at {written}: {what}")
 }

@@ -7,13 +7,13 @@ use super::table::{self, Align};
 use crate::canopen::object::ObjectId;
 use crate::tasks::settings::ValueWithUnit;
 use crate::tasks::settings::errors::{ErrorCounter, ErrorReport, Errors, PastError};
-use crate::tasks::settings::filter::{FilterOf, FilterReport};
+use crate::tasks::settings::filter::{FilterReport, SignalFilter};
 use crate::tasks::settings::limits::{Limit, Limits};
 use crate::tasks::settings::minmax::{Extremes, MinMax};
-use crate::tasks::settings::unit::{UnitChange, UnitOf, list};
+use crate::tasks::settings::unit::{SignalUnit, UnitChange, list};
 use std::io::{self, Write};
 
-impl Report for UnitOf {
+impl Report for SignalUnit {
     const COLUMNS: &'static [Column] = &[
         Column::new("node").right(),
         Column::new("signal"),
@@ -36,16 +36,16 @@ impl Report for UnitOf {
     }
 
     /// For a single signal, only the unit is printed.
-    fn text(units: &[UnitOf], out: &mut dyn Write) -> io::Result<()> {
+    fn text(units: &[SignalUnit], out: &mut dyn Write) -> io::Result<()> {
         if let [only] = units {
             return writeln!(out, "{}", only.unit);
         }
-        let choice = |unit: &UnitOf| match (unit.fixed, unit.takes.as_slice()) {
+        let choice = |unit: &SignalUnit| match (unit.fixed, unit.takes.as_slice()) {
             (true, _) => "(fixed)".to_owned(),
             (false, []) => String::new(),
             (false, takes) => format!("(accepts {})", list(takes)),
         };
-        let row = |unit: &UnitOf| vec![unit.signal.clone(), unit.unit.to_string(), choice(unit)];
+        let row = |unit: &SignalUnit| vec![unit.signal.clone(), unit.unit.to_string(), choice(unit)];
         table::write(out, &[Align::Left; 3], &units.iter().map(row).collect::<Vec<_>>())
     }
 }
@@ -120,7 +120,7 @@ impl Report for FilterReport {
     ];
 
     fn cells(&self) -> Vec<Cell> {
-        let FilterOf { node, signal, code, kind, constant } = &self.filter;
+        let SignalFilter { node, signal, code, kind, constant } = &self.filter;
         let damping_shown = self.damping_shown.into();
         let notes = notes::cell(&self.notes);
         vec![(*node).into(), signal.into(), (*code).into(), kind.into(), (*constant).into(), damping_shown, notes]

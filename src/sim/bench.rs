@@ -194,7 +194,7 @@ impl Bench {
     /// # Errors
     /// The record cannot be written.
     pub fn open(self) -> Result<MemoryBus, BenchError> {
-        let mut bus = MemoryBus::new(self.clock).with_bit_rate(self.bit_rate).with_retiming(self.retime);
+        let mut bus = MemoryBus::new(self.clock).with_bit_rate(self.bit_rate).with_bit_rate_changes(self.retime);
         self.into_devices()?.into_iter().for_each(|device| bus.attach(device));
         Ok(bus)
     }

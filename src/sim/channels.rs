@@ -308,14 +308,14 @@ impl Channels {
 impl Channel {
     fn new(signal: &SignalEntry, quantity: Quantity, filter: Filter, model: &Model, objects: &Objects) -> Channel {
         let sub = signal.channel;
-        let in_family =
+        let object_in_family =
             |(low, kind): (u16, Kind)| FAMILIES.iter().map(move |family| (ObjectId::new(family | low, sub), kind));
         let offset = (ObjectId::new(0x6127, sub), Kind::Distance);
         let described = model.description.objects.iter().filter(|entry| entry.follows_unit == Some(sub));
         let described = described.flat_map(|entry| entry.objects());
         let mut follows: Vec<(ObjectId, Kind)> = IN_PV_UNIT
             .into_iter()
-            .flat_map(in_family)
+            .flat_map(object_in_family)
             .chain([offset])
             .chain(described.map(|object| (object, Kind::Distance)))
             .filter(|(object, _)| objects.has(*object))

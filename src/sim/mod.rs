@@ -37,4 +37,4 @@ pub use device::Device;
 pub use model::{Direction, Overload};
 pub use nmt::State;
 pub use record::{HEADER, Recorder};
-pub use setup::{Oddities, OfflineAfter, Setup};
+pub use setup::{OfflineAfter, Setup, SimulatedFaults};

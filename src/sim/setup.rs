@@ -38,12 +38,12 @@ pub struct Setup {
     /// Seed of the noise.
     pub seed: u64,
     /// Faults and deviations.
-    pub oddities: Oddities,
+    pub oddities: SimulatedFaults,
 }
 
 /// Faults and deviations of a device.
 #[derive(Clone, Debug, Default)]
-pub struct Oddities {
+pub struct SimulatedFaults {
     /// Response time of SDO and LSS.
     pub latency: Duration,
     /// LSS services whose next answer is lost, once per entry. The selective switch is 43h, the identification 4Bh.
@@ -89,7 +89,7 @@ impl Setup {
             channels,
             overloads: Vec::new(),
             seed: 0,
-            oddities: Oddities::default(),
+            oddities: SimulatedFaults::default(),
         }
     }
 }

@@ -72,7 +72,7 @@ pub struct Options {
 
 /// The result of an autozero.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Zeroed {
+pub struct AutozeroReport {
     /// The CiA 404 channel.
     pub channel: u8,
     /// The name of the channel.
@@ -95,7 +95,7 @@ pub struct Zeroed {
     pub notes: Vec<Note>,
 }
 
-impl Zeroed {
+impl AutozeroReport {
     /// Returns the change of the offset. If no offset can be read, returns the change of the reading.
     pub fn shift(&self) -> Option<f64> {
         let offsets = self.offset.zip(self.offset_before).map(|(new, old)| new.as_f64() - old.as_f64());
@@ -126,7 +126,7 @@ pub fn undo_tare(
     node: NodeId,
     overrides: &Overrides,
     options: &Options,
-) -> Result<Zeroed, Failure> {
+) -> Result<AutozeroReport, Failure> {
     let device = survey_nodes(master, &[node], overrides)?;
     let mut device = device.into_iter().next().unwrap_or_else(|| Node::new(node));
     check_confirmed(Some(node), device.model.as_deref())?;
@@ -168,7 +168,7 @@ pub fn autozero(
     node: NodeId,
     overrides: &Overrides,
     options: &Options,
-) -> Result<Zeroed, Failure> {
+) -> Result<AutozeroReport, Failure> {
     let unchanged = |failure: Failure| match failure.kind() {
         Kind::Interrupted => failure.with(node, Effect::NothingChanged),
         _ => failure,
@@ -345,7 +345,7 @@ impl<'a> Procedure<'a> {
         master: &mut Master<'_>,
         plan: Option<StorePlan>,
         written: &AfterWrite,
-        report: &mut Zeroed,
+        report: &mut AutozeroReport,
     ) -> Result<(), Failure> {
         let node = self.device.id;
         let Some(plan) = plan else {
@@ -367,7 +367,7 @@ impl<'a> Procedure<'a> {
         Ok(())
     }
 
-    fn report(&self, written: Option<&AfterWrite>, notes: Vec<Note>) -> Zeroed {
+    fn report(&self, written: Option<&AfterWrite>, notes: Vec<Note>) -> AutozeroReport {
         let moved = written.and_then(|written| self.changed_offset(&written.offsets));
         let first_offset = || written.and_then(|written| self.offsets.first().zip(written.offsets.first()));
         let (old, new) = match moved.or_else(first_offset) {
@@ -375,7 +375,7 @@ impl<'a> Procedure<'a> {
             None => (self.offsets.first(), None),
         };
         let signal = &self.channel.signal;
-        Zeroed {
+        AutozeroReport {
             channel: signal.channel,
             signal: signal.name.clone(),
             unit: unit_text(signal.unit),

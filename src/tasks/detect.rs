@@ -9,7 +9,7 @@ use super::host::{HostAction, not_set};
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mode};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::master::{Error, Happening, Master, Request, SdoFailure, Ticket, Timing};
+use crate::master::{Error, Master, MasterEvent, Request, SdoFailure, Ticket, Timing};
 use crate::node::wait::{Policy, wait};
 use crate::tasks::note::Effect;
 use std::collections::BTreeSet;
@@ -211,13 +211,13 @@ fn ask_all(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<
     let until = master.now() + time_per_rate + Duration::from_micros(on_the_wire);
     let waited = wait(&mut master, until, Policy::Reconnect, |_, event| {
         match event {
-            Happening::Frame(_) => tried.frames += 1,
-            Happening::Sdo(ticket, result) => {
+            MasterEvent::Frame(_) => tried.frames += 1,
+            MasterEvent::Sdo(ticket, result) => {
                 pending.remove(&ticket);
                 let is_silent = |failure| matches!(failure, SdoFailure::NoAnswer { .. } | SdoFailure::Cancelled);
                 tried.frames += u32::from(result.map_or_else(|error| !is_silent(error.failure), |_| true));
             }
-            Happening::Fault(fault, _) => {
+            MasterEvent::Fault(fault, _) => {
                 tried.errors += u32::from(is_error(fault));
                 if fault == Fault::BusOff {
                     return ControlFlow::Break(());

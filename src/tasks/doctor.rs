@@ -6,7 +6,7 @@ use crate::bus::{Fault, Filters, Stamp};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
-use crate::master::{Error, Happening, Master, MissedAnswer, Request, SdoError, SdoFailure};
+use crate::master::{Error, Master, MasterEvent, MissedAnswer, Request, SdoError, SdoFailure};
 use crate::measure::decode::Wanted;
 use crate::measure::sample::{Sample, Source, Status};
 use crate::node::scan::{self, Presence};
@@ -239,8 +239,8 @@ fn observe(master: &mut Master<'_>, duration: Duration, presence: &mut Presence)
     let until = master.now() + duration;
     wait(master, until, Policy::Observe, |_, event| {
         match event {
-            Happening::Frame(_) => frames += 1,
-            Happening::Fault(fault, _) => presence.on_fault(fault),
+            MasterEvent::Frame(_) => frames += 1,
+            MasterEvent::Fault(fault, _) => presence.on_fault(fault),
             _ => {}
         }
         ControlFlow::<()>::Continue(())

@@ -17,7 +17,7 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::Upload;
-use crate::master::{Error, Happening, Master, Request, Ticket};
+use crate::master::{Error, Master, MasterEvent, Request, Ticket};
 use crate::node::Overrides;
 use crate::node::state::HEARTBEAT_TIME;
 use crate::node::wait::{Policy, Until, Waiter, run};
@@ -212,24 +212,24 @@ impl Waiter for HealthObserver<'_> {
         Until::Deadline(next.min(self.next_read))
     }
 
-    fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Failure> {
+    fn on_event(&mut self, master: &mut Master<'_>, event: MasterEvent) -> Result<ControlFlow<()>, Failure> {
         match event {
-            Happening::Frame(received) => self.on_frame(&received),
-            Happening::Fault(fault, _) => match self.health.faults.iter_mut().find(|(known, _)| *known == fault) {
+            MasterEvent::Frame(received) => self.on_frame(&received),
+            MasterEvent::Fault(fault, _) => match self.health.faults.iter_mut().find(|(known, _)| *known == fault) {
                 Some((_, count)) => *count += 1,
                 None => self.health.faults.push((fault, 1)),
             },
-            Happening::Dropped(count) => self.health.dropped += u64::from(count),
-            Happening::Interrupted if self.health.frames.is_empty() => return Err(Error::Interrupted.into()),
-            Happening::Interrupted => {
+            MasterEvent::Dropped(count) => self.health.dropped += u64::from(count),
+            MasterEvent::Interrupted if self.health.frames.is_empty() => return Err(Error::Interrupted.into()),
+            MasterEvent::Interrupted => {
                 self.finish(master.now());
                 return Ok(ControlFlow::Break(()));
             }
-            Happening::Ended => {
+            MasterEvent::Ended => {
                 self.finish(self.last);
                 return Ok(ControlFlow::Break(()));
             }
-            Happening::Deadline => {
+            MasterEvent::Deadline => {
                 let now = master.now();
                 self.interpreter.expire(now, &mut self.entries);
                 self.count_entries();
@@ -241,8 +241,8 @@ impl Waiter for HealthObserver<'_> {
                     self.start_read(master);
                 }
             }
-            Happening::Sdo(ticket, _) => self.pending.retain(|(own, _)| *own != ticket),
-            Happening::Link(_) => {}
+            MasterEvent::Sdo(ticket, _) => self.pending.retain(|(own, _)| *own != ticket),
+            MasterEvent::Link(_) => {}
         }
         Ok(ControlFlow::Continue(()))
     }

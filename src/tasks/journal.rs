@@ -60,7 +60,7 @@ impl Journal for NoJournal {
 
 /// The result of undoing a temporary write of an earlier run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Undone {
+pub enum UndoResult {
     /// The object has its old value again.
     Restored,
     /// The object does not have the written value: another program changed it, or the device restarted.
@@ -71,10 +71,10 @@ pub enum Undone {
     NotRestored,
 }
 
-impl Undone {
+impl UndoResult {
     /// Whether the record is still needed.
     pub fn is_open(self) -> bool {
-        matches!(self, Undone::OtherDevice | Undone::NotRestored)
+        matches!(self, UndoResult::OtherDevice | UndoResult::NotRestored)
     }
 }
 
@@ -89,26 +89,26 @@ impl TemporaryWrite {
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.
-    pub fn undo(&self, master: &mut Master<'_>) -> Result<Undone, MasterError> {
+    pub fn undo(&self, master: &mut Master<'_>) -> Result<UndoResult, MasterError> {
         let subs = [1, 2, 3, 4].map(|sub| (self.node, ObjectId::new(0x1018, sub), DataType::Unsigned(4)));
         for (value, recorded) in read_values(master, &subs)?.into_iter().zip(self.identity) {
             let found = value.ok().and_then(|value| value.as_u64());
             if let (Some(found), Some(recorded)) = (found, recorded)
                 && found != u64::from(recorded)
             {
-                return Ok(Undone::OtherDevice);
+                return Ok(UndoResult::OtherDevice);
             }
         }
         match self.has_value(master, &self.written)? {
             Some(true) => {}
-            Some(false) => return Ok(Undone::ChangedSince),
-            None => return Ok(Undone::NotRestored),
+            Some(false) => return Ok(UndoResult::ChangedSince),
+            None => return Ok(UndoResult::NotRestored),
         }
         match write(master, &Node::new(self.node), self.object, &self.before) {
-            Ok(_) if self.has_value(master, &self.before)? == Some(true) => Ok(Undone::Restored),
+            Ok(_) if self.has_value(master, &self.before)? == Some(true) => Ok(UndoResult::Restored),
             Err(Error::Bus(error)) => Err(MasterError::Bus(error)),
             Err(Error::Interrupted) => Err(MasterError::Interrupted),
-            Ok(_) | Err(_) => Ok(Undone::NotRestored),
+            Ok(_) | Err(_) => Ok(UndoResult::NotRestored),
         }
     }
 

@@ -10,7 +10,7 @@ pub use interpreter::Interpreter;
 
 use crate::bus::Mono;
 use crate::canopen::id::{CanId, NodeId};
-use crate::master::{Happening, Master};
+use crate::master::{Master, MasterEvent};
 use crate::node::Overrides;
 use crate::node::overheard::Overheard;
 use crate::node::wait::{Policy, Until, Waiter, run, wait};
@@ -61,7 +61,7 @@ pub struct MonitorReport {
 pub fn identify(master: &mut Master<'_>) -> Result<Overrides, Failure> {
     let mut overheard = Overheard::default();
     wait(master, Mono::at(Duration::MAX), Policy::Record, |_, event| {
-        if let Happening::Frame(received) = event {
+        if let MasterEvent::Frame(received) = event {
             overheard.take(&received);
         }
         ControlFlow::<()>::Continue(())
@@ -131,27 +131,27 @@ impl Waiter for Watcher<'_> {
         Until::Deadline(self.interpreter.next_deadline().map_or(self.end, |next| next.min(self.end)))
     }
 
-    fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Failure> {
+    fn on_event(&mut self, master: &mut Master<'_>, event: MasterEvent) -> Result<ControlFlow<()>, Failure> {
         let now = master.bus().now();
         let entries = &mut self.entries;
         let mut is_over = false;
         match event {
-            Happening::Frame(received) => {
+            MasterEvent::Frame(received) => {
                 let kind = self.interpreter.take(&received, entries);
                 *self.report.frames.entry(kind).or_default() += 1;
                 if kind.is_of_master(&received.frame) {
                     self.report.masters.insert(kind);
                 }
             }
-            Happening::Fault(fault, at) => self.interpreter.fault(fault, at, entries),
-            Happening::Dropped(count) => entries.push(Entry::of_bus(now, Content::Dropped(count))),
-            Happening::Link(is_up) => entries.push(Entry::of_bus(now, Content::Link(is_up))),
-            Happening::Deadline => {
+            MasterEvent::Fault(fault, at) => self.interpreter.fault(fault, at, entries),
+            MasterEvent::Dropped(count) => entries.push(Entry::of_bus(now, Content::Dropped(count))),
+            MasterEvent::Link(is_up) => entries.push(Entry::of_bus(now, Content::Link(is_up))),
+            MasterEvent::Deadline => {
                 self.interpreter.expire(now.mono, entries);
                 is_over = now.mono >= self.end;
             }
-            Happening::Interrupted | Happening::Ended => is_over = true,
-            Happening::Sdo(..) => {}
+            MasterEvent::Interrupted | MasterEvent::Ended => is_over = true,
+            MasterEvent::Sdo(..) => {}
         }
         if is_over {
             self.interpreter.finish(entries);

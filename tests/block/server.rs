@@ -75,7 +75,7 @@ impl Server {
     }
 
     pub(crate) fn on_frame(&mut self, frame: &Frame) -> Vec<Frame> {
-        let Some(bytes) = frame.all_eight().filter(|_| frame.id() == CanId::sdo_request(self.node)) else {
+        let Some(bytes) = frame.as_eight_bytes().filter(|_| frame.id() == CanId::sdo_request(self.node)) else {
             return Vec::new();
         };
         if bytes[0] == 0x80 {

@@ -9,7 +9,7 @@ use crate::kinds::LARGE_KIND;
 use crate::random::Random;
 use crate::spec::{Act, DeviceSpec, Other, Spec};
 use cangauge::bus::Bus;
-use cangauge::bus::coded::Coded;
+use cangauge::bus::coded::TextRoundTrip;
 use cangauge::device::{catalog, eds};
 use cangauge::master::{Master, Timing};
 use cangauge::node::Overrides;
@@ -62,7 +62,7 @@ fn doctor_finds_nothing_where_all_is_well() {
     for seed in 1..=env_number("ENGINE_HEALTHY").unwrap_or(BENCHES) {
         let spec = healthy(seed);
         let recorder = Recorder::new(Box::new(std::io::sink())).expect("no file");
-        let mut bus = Coded::new(bench(&spec, &recorder), spec.codec);
+        let mut bus = TextRoundTrip::new(bench(&spec, &recorder), spec.codec);
         let until = bus.mono() + Duration::from_millis(20);
         while matches!(bus.receive(until), Ok(cangauge::bus::Event::Frame(_))) {}
         let timing = Timing { timeout: Duration::from_millis(500), retries: 1 };
@@ -115,7 +115,7 @@ fn conform_finds_no_deviation_on_a_device_without_a_fault() {
     for seed in 1..=env_number("ENGINE_HEALTHY").unwrap_or(CHECKED) {
         let spec = alone(seed);
         let recorder = Recorder::new(Box::new(std::io::sink())).expect("no file");
-        let mut bus = Coded::new(bench(&spec, &recorder), spec.codec);
+        let mut bus = TextRoundTrip::new(bench(&spec, &recorder), spec.codec);
         let until = bus.mono() + Duration::from_millis(20);
         while matches!(bus.receive(until), Ok(cangauge::bus::Event::Frame(_))) {}
         let node = crate::carry_out::node(spec.devices[0].node.expect("a node-ID"));

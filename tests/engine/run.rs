@@ -6,7 +6,7 @@ use crate::spec::Spec;
 use crate::station::{FaultyDevice, ms};
 use crate::tap::{Passed, Tap};
 use crate::time::bound;
-use cangauge::bus::coded::Coded;
+use cangauge::bus::coded::TextRoundTrip;
 use cangauge::bus::faults::Faulty;
 use cangauge::bus::memory::MemoryBus;
 use cangauge::bus::paced::Paced;
@@ -21,7 +21,7 @@ use std::time::Duration;
 /// A finished command.
 pub(crate) struct Run {
     pub(crate) result: Result<Claim, Failure>,
-    pub(crate) bus: Tap<Coded<Faulty<MemoryBus>>>,
+    pub(crate) bus: Tap<TextRoundTrip<Faulty<MemoryBus>>>,
     /// The devices before the command.
     pub(crate) before: Vec<DeviceState>,
     pub(crate) started: Mono,
@@ -100,7 +100,7 @@ pub(crate) fn run(spec: &Spec) -> Run {
     let mut before = device_states(&bus);
     let bound = bound(spec);
     let kill = spec.kill.map(|kill| kill.before);
-    let bus = Coded::new(Faulty::new(bus, plan(&spec.faults)), spec.codec);
+    let bus = TextRoundTrip::new(Faulty::new(bus, plan(&spec.faults)), spec.codec);
     let mut bus = Tap::new(bus, started + bound, kill);
     let mut observed = Observations::default();
     let mut result = carry_out(&mut paced(&mut bus), spec, &mut observed);

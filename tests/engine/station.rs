@@ -187,7 +187,7 @@ impl FaultyDevice {
 
     fn refusal(&self, frame: &Frame) -> Option<Frame> {
         let node = self.device.node()?;
-        let data = frame.all_eight().filter(|_| frame.id() == CanId::sdo_request(node))?;
+        let data = frame.as_eight_bytes().filter(|_| frame.id() == CanId::sdo_request(node))?;
         let index = u16::from_le_bytes([data[1], data[2]]);
         let begins = matches!(data[0] >> 5, 1 | 2)
             || data[0] >> 5 == 6 && data[0] & 1 == 0
@@ -217,7 +217,7 @@ impl Station for FaultyDevice {
         if self.hung_until(now).is_some() || self.deviation.is_some_and(|deviation| deviation.ignores(frame)) {
             return;
         }
-        if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight())
+        if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.as_eight_bytes())
             && self.device.node() == Some(node)
             && data[0] >> 5 == 1
             && is_signature(&data[4..])
@@ -321,7 +321,7 @@ impl Station for SecondMaster {
         if frame.id().sdo_response_node().map(NodeId::get) != Some(node) {
             return;
         }
-        let Some(data) = frame.all_eight() else { return };
+        let Some(data) = frame.as_eight_bytes() else { return };
         match data[0] >> 5 {
             2 if data[0] & 2 == 0 => out.send(request(node, [0x60, 0, 0, 0, 0, 0, 0, 0])),
             0 if data[0] & 1 == 0 => {

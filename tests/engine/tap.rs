@@ -86,7 +86,7 @@ impl<B: Bus> BitRateControl for Tap<B> {
 
 impl<B: Bus> Bus for Tap<B> {
     cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live sends_remote_frames waits now mono listen receive_buffer
-        late_drops finish);
+        unreported_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         self.is_dead |= self.kill == Some(self.taken);

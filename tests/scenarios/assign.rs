@@ -88,7 +88,7 @@ fn run(bus: &mut MemoryBus, target: &str, wanted: &Wanted) -> Done {
     master.settle();
     // The last frames arrive.
     let until = master.now() + std::time::Duration::from_millis(20);
-    while !matches!(master.next(until), Ok(cangauge::master::Happening::Deadline) | Err(_)) {}
+    while !matches!(master.next(until), Ok(cangauge::master::MasterEvent::Deadline) | Err(_)) {}
     drop(master);
     assert!(!bus.stations::<Device>().any(Device::is_configuring), "left in configuration state: {result:?}");
     Done { result, notes }

@@ -13,7 +13,7 @@ use cangauge::node::Overrides;
 use cangauge::output::config::write_toml;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Setup};
-use cangauge::tasks::config::{Applied, Arrivals, File, Journal, Options, Sections, Snapshot, apply, read, resume};
+use cangauge::tasks::config::{ApplyReport, Arrivals, File, Journal, Options, Sections, Snapshot, apply, read, resume};
 use cangauge::tasks::restore::restore;
 use cangauge::tasks::store::Group;
 use cangauge::tasks::{Failure, Kind};
@@ -103,7 +103,7 @@ fn dump(bus: &mut dyn Bus, number: u8) -> String {
     text.lines().filter(is_own).collect::<Vec<_>>().join("\n")
 }
 
-fn set(bus: &mut dyn Bus, number: u8, file: &str, options: &Options) -> Result<Applied, Failure> {
+fn set(bus: &mut dyn Bus, number: u8, file: &str, options: &Options) -> Result<ApplyReport, Failure> {
     set_with(bus, number, file, options, &mut KeptJournal::default())
 }
 
@@ -113,7 +113,7 @@ fn set_with(
     file: &str,
     options: &Options,
     journal: &mut KeptJournal,
-) -> Result<Applied, Failure> {
+) -> Result<ApplyReport, Failure> {
     let mut document = Document::parse(file).expect("TOML");
     if let Some(before) = &journal.0 {
         resume(&mut document, &Document::parse(before).expect("TOML"));

@@ -458,7 +458,7 @@ impl Bus for UnstableBus {
         }
     }
 
-    fn late_drops(&mut self) -> u32 {
+    fn unreported_drops(&mut self) -> u32 {
         7
     }
 }

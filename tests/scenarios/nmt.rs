@@ -160,7 +160,7 @@ impl cangauge::bus::BitRateControl for Counting {
 }
 
 impl Bus for Counting {
-    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
+    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer unreported_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         self.asked += u32::from(frame.is_remote());

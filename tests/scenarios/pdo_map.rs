@@ -92,7 +92,7 @@ impl cangauge::bus::BitRateControl for FaultyBus {
 }
 
 impl Bus for FaultyBus {
-    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
+    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer unreported_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sent.len();

@@ -13,7 +13,7 @@ use cangauge::master::{Master, Timing};
 use cangauge::output::failure::ErrorMessage;
 use cangauge::output::notes::note;
 use cangauge::sim::{Device, Setup, State};
-use cangauge::tasks::journal::{NoJournal, Undone};
+use cangauge::tasks::journal::{NoJournal, UndoResult};
 use cangauge::tasks::pdo::{Item, MapReport, PdoRequest, Trigger, map};
 use cangauge::tasks::{Failure, Kind};
 use std::collections::BTreeMap;
@@ -185,7 +185,7 @@ fn killed_change_of_the_inhibit_time_leaves_the_pdo_on() {
     let mut kept = KeptJournal::default();
     assert_eq!((run(&mut clean, &mut kept).unwrap().writes, kept.0.len()), (3, 0));
     let writes = clean.sent.iter().enumerate().filter(|(_, frame)| is_write(frame)).map(|(at, _)| at);
-    for (at, undone) in writes.zip([Undone::ChangedSince, Undone::Restored, Undone::Restored]) {
+    for (at, undone) in writes.zip([UndoResult::ChangedSince, UndoResult::Restored, UndoResult::Restored]) {
         let mut bench = new();
         let mut killed = FaultyBus::new(bench.bus, Fault::Gone, at);
         let mut kept = KeptJournal::default();

@@ -10,7 +10,7 @@ use cangauge::device::scalar::Scalar;
 use cangauge::master::{Error, Master, Timing};
 use cangauge::node::Node;
 use cangauge::sim::{Device, Setup};
-use cangauge::tasks::journal::{Journal, JournalError, NoJournal, TemporaryWrite, Undone};
+use cangauge::tasks::journal::{Journal, JournalError, NoJournal, TemporaryWrite, UndoResult};
 use cangauge::tasks::nmt::probe;
 use std::time::Duration;
 
@@ -96,7 +96,7 @@ struct Flipping<B> {
 
 impl<B: Bus> Bus for Flipping<B> {
     cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live sends_remote_frames waits now mono listen receive
-        receive_buffer late_drops finish);
+        receive_buffer unreported_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let mut data = frame.data().to_vec();
@@ -133,7 +133,7 @@ fn heartbeat_is_restored_again_after_a_wrong_write() {
         before: vec![0, 0],
         written: vec![100, 0],
     };
-    for (flipped, expected) in [(1..1, Undone::Restored), (0..1, Undone::NotRestored)] {
+    for (flipped, expected) in [(1..1, UndoResult::Restored), (0..1, UndoResult::NotRestored)] {
         let mut bus = Flipping { bus: bus_of("mh4", 100), writes: 0, flipped };
         assert_eq!(write.undo(&mut Master::new(&mut bus, Timing::default())).expect("a bus"), expected);
     }
@@ -175,10 +175,10 @@ fn next_run_restores_changes_of_a_killed_one() {
         (undone, heartbeat_time(&mut bus))
     };
     for kind in ["mh4", "dps"] {
-        assert_eq!(undo(kind, 100, left([None; 4])), (Undone::Restored, 500), "{kind}");
-        assert_eq!(undo(kind, 200, left([None; 4])), (Undone::ChangedSince, 200), "{kind}");
-        assert_eq!(undo(kind, 100, left([Some(1), None, None, None])), (Undone::OtherDevice, 100), "{kind}");
+        assert_eq!(undo(kind, 100, left([None; 4])), (UndoResult::Restored, 500), "{kind}");
+        assert_eq!(undo(kind, 200, left([None; 4])), (UndoResult::ChangedSince, 200), "{kind}");
+        assert_eq!(undo(kind, 100, left([Some(1), None, None, None])), (UndoResult::OtherDevice, 100), "{kind}");
     }
     let absent = TemporaryWrite { node: NodeId::new(9).expect("a node-ID"), ..left([None; 4]) };
-    assert_eq!(undo("mh4", 100, absent), (Undone::NotRestored, 100));
+    assert_eq!(undo("mh4", 100, absent), (UndoResult::NotRestored, 100));
 }

@@ -13,7 +13,7 @@ use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, State};
 use cangauge::tasks::Fact;
 use cangauge::tasks::autozero::AutozeroFact;
-use cangauge::tasks::autozero::{Limit, Options, ZeroTarget, Zeroed, autozero};
+use cangauge::tasks::autozero::{AutozeroReport, Limit, Options, ZeroTarget, autozero};
 use cangauge::tasks::store::{self, Group, StoreReport, Verified};
 use cangauge::tasks::{Failure, Kind, restore};
 use std::path::Path;
@@ -96,7 +96,7 @@ impl cangauge::bus::BitRateControl for FaultyBus {
 }
 
 impl Bus for FaultyBus {
-    cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
+    cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive_buffer unreported_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sent.len();
@@ -171,7 +171,7 @@ fn frames(run: impl Fn(&mut FaultyBus), kind: &str, settings: &str) -> usize {
 
 const CONSTANT_VALUE: &str = "[[device.channel]]\nchannel = 1\nbase = 0.0625\namplitude = 0.0\nnoise = 0.0\n";
 
-fn zero(bus: &mut FaultyBus, store: bool) -> Result<Zeroed, Failure> {
+fn zero(bus: &mut FaultyBus, store: bool) -> Result<AutozeroReport, Failure> {
     let options = Options {
         target: ZeroTarget::Autozero,
         channel: None,

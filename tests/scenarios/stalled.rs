@@ -13,7 +13,7 @@ use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::DownloadSize;
 use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog;
-use cangauge::master::{Happening, Master, MissedAnswer, OnTwoDevices, Request, SdoError, SdoFailure, Timing};
+use cangauge::master::{Master, MasterEvent, MissedAnswer, OnTwoDevices, Request, SdoError, SdoFailure, Timing};
 use cangauge::sim::Bench;
 use cangauge::tasks::log::{LogOptions, Mode, Remark, log};
 use std::collections::{BTreeMap, VecDeque};
@@ -61,7 +61,7 @@ impl cangauge::bus::BitRateControl for Stalled {
 }
 
 impl Bus for Stalled {
-    cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
+    cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive_buffer unreported_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         if frame.to_string() == "080#" {
@@ -202,7 +202,7 @@ fn frame_received_before_the_request_is_not_its_answer() {
     let mut bus = stall(inner, 0..500, false);
     let mut master = Master::new(&mut bus, Timing::default());
     let first = master.next(Mono::at(Duration::from_secs(1))).expect("the bus works");
-    assert!(matches!(first, Happening::Frame(_)), "{first:?}: the answer still waits");
+    assert!(matches!(first, MasterEvent::Frame(_)), "{first:?}: the answer still waits");
     assert_eq!(read(&mut master).expect("an answer"), Some(1), "99 is the old frame");
 }
 

@@ -29,9 +29,9 @@ mod simulated;
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::lss::{self, Answer, Exchange, ExchangeError, Fastscan, Part, Request};
-use cangauge::canopen::nmt::{Life, NmtCommand};
+use cangauge::canopen::nmt::{ErrorControlMessage, NmtCommand};
 use cangauge::canopen::object::ObjectId;
-use cangauge::canopen::pdo::{Field, MappingEntry, lay_out};
+use cangauge::canopen::pdo::{Field, MappingEntry, field_layout};
 use cangauge::canopen::sdo::{
     BlockDownload, BlockSize, BlockUpload, Download, DownloadSize, Progress, TransferError, Upload, Uploaded, fit,
 };
@@ -44,7 +44,7 @@ enum Machine {
     BlockUpload(BlockUpload, Option<DataType>),
     BlockDownload(BlockDownload),
     Sent,
-    Life(NodeId),
+    ErrorControlMessage(NodeId),
     Tpdo(CanId, Vec<Field>, Vec<DataType>),
     Lss(Exchange),
     Fastscan(Fastscan),
@@ -127,7 +127,7 @@ impl Case {
             "life" => {
                 let node = keys["node"];
                 let sent = keys.get("after").map(|command| nmt(command, keys.get("of").unwrap_or(&node)));
-                let machine = Machine::Life(node.parse().expect("a node-ID"));
+                let machine = Machine::ErrorControlMessage(node.parse().expect("a node-ID"));
                 return Some(Case::other(machine, sent.into_iter().collect::<VecDeque<_>>()));
             }
             "tpdo" => {
@@ -141,7 +141,7 @@ impl Case {
                     "sync" => Frame::empty(CanId::SYNC),
                     command => nmt(command, keys["node"]),
                 });
-                let machine = Machine::Tpdo(id, lay_out(&entries), types);
+                let machine = Machine::Tpdo(id, field_layout(&entries), types);
                 return Some(Case::other(machine, sent.into_iter().collect::<VecDeque<_>>()));
             }
             "lss-fastscan" => {
@@ -178,7 +178,7 @@ impl Case {
     fn outcome(&self) -> Option<String> {
         match &self.machine {
             Machine::Sent => Some("sent".to_owned()),
-            Machine::Life(_) | Machine::Tpdo(..) => Some(self.received.join("; ")),
+            Machine::ErrorControlMessage(_) | Machine::Tpdo(..) => Some(self.received.join("; ")),
             Machine::Lss(exchange) if !exchange.is_answered() => Some("sent".to_owned()),
             Machine::Lss(exchange) => Some(match exchange.one() {
                 Ok(Answer::Acknowledge(_) | Answer::Selected | Answer::Here) => "done".to_owned(),
@@ -254,12 +254,12 @@ impl Case {
                 other => outcome(other),
             },
             Machine::Sent => None,
-            Machine::Life(node) => {
-                let (of, life) = Life::parse(frame).expect("a heartbeat or boot-up message");
+            Machine::ErrorControlMessage(node) => {
+                let (of, life) = ErrorControlMessage::parse(frame).expect("a heartbeat or boot-up message");
                 assert_eq!(of, *node, "{frame}");
                 self.received.push(match life {
-                    Life::BootUp => "boot-up".to_owned(),
-                    Life::State(state) => state.to_string(),
+                    ErrorControlMessage::BootUp => "boot-up".to_owned(),
+                    ErrorControlMessage::State(state) => state.to_string(),
                 });
                 None
             }
@@ -288,7 +288,7 @@ impl Case {
             Machine::Download(download) => Some(download.on_timeout(&mut out)),
             Machine::BlockUpload(upload, _) => upload.on_timeout(&mut out),
             Machine::BlockDownload(download) => Some(download.on_timeout(&mut out)),
-            Machine::Sent | Machine::Life(_) | Machine::Tpdo(..) => None,
+            Machine::Sent | Machine::ErrorControlMessage(_) | Machine::Tpdo(..) => None,
             Machine::Lss(exchange) => {
                 out.extend(exchange.ask());
                 None

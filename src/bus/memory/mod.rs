@@ -112,7 +112,7 @@ impl MemoryBus {
     }
 
     /// Sets whether the program may change the bit rate.
-    pub fn with_retiming(mut self, allowed: bool) -> MemoryBus {
+    pub fn with_bit_rate_changes(mut self, allowed: bool) -> MemoryBus {
         self.can_retime = allowed;
         self
     }

@@ -8,7 +8,7 @@ mod clock;
 mod firmware;
 mod text;
 
-use super::own_clock::OwnClock;
+use super::own_clock::InterfaceClock;
 use super::stream::{Output, Protocol};
 use super::{BusError, Event, Fault, Mode, Mono, Received, Stamp, TimestampSource};
 use crate::canopen::frame::Frame;
@@ -121,7 +121,7 @@ pub(super) struct Slcan {
     is_retiming: bool,
     refusal: Option<String>,
     clock: MinuteClock,
-    own_clock: OwnClock,
+    own_clock: InterfaceClock,
 }
 
 impl Slcan {
@@ -147,7 +147,7 @@ impl Slcan {
             is_retiming: false,
             refusal: None,
             clock: MinuteClock::default(),
-            own_clock: OwnClock::default(),
+            own_clock: InterfaceClock::default(),
         }
     }
 

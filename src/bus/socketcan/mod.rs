@@ -13,7 +13,7 @@ mod setup;
 mod socket;
 
 use super::interrupt::Interrupts;
-use super::own_clock::OwnClock;
+use super::own_clock::InterfaceClock;
 use super::{
     BitRateControl, Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource, Wall,
     poll,
@@ -50,7 +50,7 @@ pub struct SocketCan {
     opened: Instant,
     batch: Batch,
     clocks: Clocks,
-    own_clock: OwnClock,
+    own_clock: InterfaceClock,
     /// The time of the last frame that was processed.
     last_frame_at: Mono,
     /// Whether the socket was found empty. The next read then waits first.
@@ -117,7 +117,7 @@ impl SocketCan {
             opened: Instant::now(),
             batch: Batch::new(),
             clocks: Clocks::default(),
-            own_clock: OwnClock::default(),
+            own_clock: InterfaceClock::default(),
             last_frame_at: Mono::START,
             is_drained: false,
             expected_answers: 0,
@@ -266,13 +266,13 @@ impl SocketCan {
             Err(BusError::NoInterface(_) | BusError::NotCan(_)) => return Ok(()),
             Err(error) => return Err(error),
         };
-        let more = self.late_drops();
+        let more = self.unreported_drops();
         if more > 0 {
             self.ready.push_back(Event::Dropped(more));
         }
         (self.socket, self.wanted, self.timestamps) = (bound.socket, bound.wanted, bound.timestamps);
         (self.is_removed, self.reported_drops, self.is_drained) = (false, 0, false);
-        self.own_clock = OwnClock::default();
+        self.own_clock = InterfaceClock::default();
         // If the interface is down, the socket reports this as its first error.
         match self.socket.as_raw_socket().take_error() {
             Ok(None) => self.set_is_up(true),
@@ -385,7 +385,7 @@ impl Bus for SocketCan {
         socket::receive_buffer(&self.socket)
     }
 
-    fn late_drops(&mut self) -> u32 {
+    fn unreported_drops(&mut self) -> u32 {
         let Some(lost) = socket::lost(&self.socket) else { return 0 };
         let more = lost.wrapping_sub(self.reported_drops);
         self.reported_drops = lost;

@@ -73,7 +73,7 @@ pub enum FastscanError {
     AnswersEverything,
     /// The answers contradict each other.
     #[error("the answers about the {} contradict each other", name(*.0))]
-    Unsettled(Part),
+    Contradiction(Part),
 }
 
 fn name(part: Part) -> &'static str {
@@ -264,7 +264,7 @@ impl Fastscan {
     }
 
     fn contradiction(&self) -> Progress {
-        Progress::Failed(FastscanError::Unsettled(self.part))
+        Progress::Failed(FastscanError::Contradiction(self.part))
     }
 }
 
@@ -343,7 +343,7 @@ mod tests {
                     end => break end,
                 }
             };
-            assert!(matches!(end, Progress::Failed(FastscanError::Unsettled(_))), "{last}: {end:?}");
+            assert!(matches!(end, Progress::Failed(FastscanError::Contradiction(_))), "{last}: {end:?}");
         }
     }
 

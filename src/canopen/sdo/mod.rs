@@ -19,7 +19,7 @@ pub use block_upload::BlockUpload;
 pub use crc::crc16;
 pub use download::{Download, DownloadSize};
 pub use fit::{FitError, Fitted, Note, fit};
-pub use upload::{LONGEST, Upload, Uploaded, proves_60};
+pub use upload::{LONGEST, Upload, Uploaded, proves_upload_answer_60};
 
 use super::frame::Frame;
 use super::id::{CanId, NodeId};

@@ -62,7 +62,7 @@ pub struct Upload {
 
 /// Whether this frame proves that a server answers uploads with 60h. The frame then contains the device type (1000h).
 /// 1000h cannot be written, so the frame does not acknowledge a download.
-pub fn proves_60(frame: &Frame) -> bool {
+pub fn proves_upload_answer_60(frame: &Frame) -> bool {
     let [0x60, 0x00, 0x10, 0, number @ ..] = frame.data() else { return false };
     number.len() == 4 && number.iter().any(|&byte| byte != 0)
 }
@@ -137,7 +137,7 @@ impl Upload {
         let data = frame.data();
         let expedited = command & 0x02 != 0;
         let indicated = command & 0x01 != 0;
-        if command == 0x60 && (self.accept_60 || proves_60(frame)) {
+        if command == 0x60 && (self.accept_60 || proves_upload_answer_60(frame)) {
             return Progress::Done(Uploaded { indicated: false, ..Uploaded::complete(data[4..].to_vec()) });
         }
         if command >> 5 != 2 {

@@ -23,8 +23,8 @@ use crate::output::failure::ErrorMessage;
 use crate::output::notes;
 use crate::tasks::config::diff::check_offline;
 use crate::tasks::config::{
-    Applied, ConfigFailure, File, FileSettings, Line, Options, Sections, Snapshot, apply, check_device, lines, read,
-    resume,
+    ApplyReport, ConfigFailure, File, FileSettings, Line, Options, Sections, Snapshot, apply, check_device, lines,
+    read, resume,
 };
 use crate::tasks::{Failure, Kind, Note};
 use clap::Args;
@@ -109,7 +109,7 @@ fn check_before(document: &Document, file: &str) -> anyhow::Result<()> {
 
 /// The result for one node: the applied settings, or (--dry-run) the lines to write.
 enum Outcome {
-    Applied(Box<Applied>),
+    ApplyReport(Box<ApplyReport>),
     Lines(Vec<Line>, Vec<Note>),
 }
 
@@ -138,7 +138,7 @@ impl Apply {
         };
         if let (Some(file), Some(path)) = (record, &self.record) {
             let applied = done.iter().filter_map(|outcome| match outcome {
-                Outcome::Applied(applied) => Some(&**applied),
+                Outcome::ApplyReport(applied) => Some(&**applied),
                 Outcome::Lines(..) => None,
             });
             let record = ConfigRecord {
@@ -313,14 +313,14 @@ impl Apply {
         }
         let mut applied = apply(master, snapshot, &settings, &options, overrides, &mut journal).map_err(as_list)?;
         applied.notes.splice(..0, found);
-        Ok(Outcome::Applied(Box::new(applied)))
+        Ok(Outcome::ApplyReport(Box::new(applied)))
     }
 
     fn report(&self, global: &Global, done: Vec<Outcome>) -> anyhow::Result<()> {
         let (mut reports, mut steps, mut all_notes) = (Vec::new(), Vec::new(), Vec::new());
         for outcome in done {
             match outcome {
-                Outcome::Applied(applied) => {
+                Outcome::ApplyReport(applied) => {
                     all_notes.extend(applied.notes.iter().cloned());
                     reports.push(AppliedReport(*applied));
                 }

@@ -80,7 +80,7 @@ fn characters(table: &Table<'_>, name: &str) -> bool {
 
 /// Reports a name of a signal or object that can be confused with an address.
 fn name(table: &Table<'_>, name: &str) {
-    if characters(table, name) && ObjectId::reads_as_address(name) {
+    if characters(table, name) && ObjectId::looks_like_address(name) {
         table.mistake("name", format!("name: \"{name}\" would be read as an address"));
     }
 }

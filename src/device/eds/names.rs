@@ -110,7 +110,7 @@ fn count<'a>(names: impl Iterator<Item = &'a str>) -> HashMap<String, u32> {
 
 /// Whether a sub-object can have this name: it is not empty, no object has it, and it does not read as an address.
 fn is_free(name: &str, taken: &HashSet<String>) -> bool {
-    !name.is_empty() && !taken.contains(name) && !ObjectId::reads_as_address(name)
+    !name.is_empty() && !taken.contains(name) && !ObjectId::looks_like_address(name)
 }
 
 /// Returns a unique name for every object: its own name, with the index appended if necessary.
@@ -121,7 +121,7 @@ fn object_names(slugs: &BTreeMap<u16, String>) -> BTreeMap<u16, String> {
         let nameless = slug.is_empty();
         let mut name = if nameless { self::nameless(*index) } else { slug.clone() };
         let others = counts.get(&name).copied().unwrap_or_default().saturating_sub(u32::from(!nameless));
-        let mut clashes = others > 0 || ObjectId::reads_as_address(&name);
+        let mut clashes = others > 0 || ObjectId::looks_like_address(&name);
         // Only a name in the file that already ends with this index can clash again.
         while clashes {
             name = format!("{name}-{index:04x}");

@@ -69,7 +69,7 @@ impl Pace {
 
 impl Lss<'_, '_> {
     /// Finds a slave without a node-ID and switches it to configuration state (51h); `None` if there is none. To find
-    /// several slaves, give each one a node-ID before the next scan, or use [`Lss::fastscan_beside`].
+    /// several slaves, give each one a node-ID before the next scan, or use [`Lss::fastscan_excluding`].
     ///
     /// All slaves are switched to waiting state first. The found address is confirmed by inquiry. If the slave does not
     /// support this, the address is confirmed by selective addressing.
@@ -77,11 +77,11 @@ impl Lss<'_, '_> {
     /// # Errors
     /// Slaves answer, but no address can be confirmed; the bus failed or the user interrupted.
     pub fn fastscan(&mut self) -> Result<Option<LssAddress>, LssError> {
-        self.fastscan_beside(&[], None)
+        self.fastscan_excluding(&[], None)
     }
 
     /// Switches all slaves to waiting state, and asks the slaves without a node-ID to answer. Does not wait for the
-    /// answer: see [`Lss::is_anyone_unconfigured`]. Returns the moment of the request.
+    /// answer: see [`Lss::has_unconfigured_slave`]. Returns the moment of the request.
     ///
     /// # Errors
     /// The bus failed or the user interrupted.
@@ -97,7 +97,7 @@ impl Lss<'_, '_> {
     ///
     /// # Errors
     /// The bus failed or the user interrupted.
-    pub fn is_anyone_unconfigured(&mut self, asked: Mono, timeout: Duration) -> Result<bool, LssError> {
+    pub fn has_unconfigured_slave(&mut self, asked: Mono, timeout: Duration) -> Result<bool, LssError> {
         let mut until = asked + timeout;
         if self.master.timing.retries > 0 {
             if self.has_fastscan_answer(asked, asked + RETRY_PAUSE)? {
@@ -128,7 +128,7 @@ impl Lss<'_, '_> {
     ///
     /// # Errors
     /// As [`Lss::fastscan`], or a slave in `excluded` does not answer.
-    pub fn fastscan_beside(
+    pub fn fastscan_excluding(
         &mut self,
         excluded: &[LssAddress],
         all_slaves: Option<Duration>,
@@ -180,7 +180,7 @@ impl Lss<'_, '_> {
         }
     }
 
-    /// Carries out one step, and returns the number of answers. `all_slaves` is as in [`Lss::fastscan_beside`].
+    /// Carries out one step, and returns the number of answers. `all_slaves` is as in [`Lss::fastscan_excluding`].
     fn step(&mut self, step: Step, pace: &mut Pace, all_slaves: Option<Duration>) -> Result<usize, LssError> {
         let sent = self.send_now(step.request.frame())?;
         let usual = sent + pace.step_timeout(step.extensions);

@@ -88,7 +88,7 @@ impl Typed {
             return Err(units_differ(&self, to));
         }
         let offsets = match (offsets, other_offsets) {
-            _ if from.has_zero_of(unit) => 0.0,
+            _ if from.has_same_zero(unit) => 0.0,
             (Offsets::Known(offsets), _) | (Offsets::Literal, Offsets::Known(offsets)) => offsets,
             (Offsets::Literal, Offsets::Literal) => 1.0,
             (Offsets::Unknown, _) | (Offsets::Literal, Offsets::Unknown) => {
@@ -201,7 +201,7 @@ fn convert_term(term: Typed, to: &Typed) -> Result<Typed, LocatedError> {
     if let (Dimension::In(from, Offsets::Literal), Dimension::In(unit, offsets)) = (term.dimension, to.dimension)
         && offsets != Offsets::Known(0.0)
         && from.convert(1.0, unit).is_some()
-        && !from.has_zero_of(unit)
+        && !from.has_same_zero(unit)
     {
         return Err(ambiguous(&term, to, from, unit));
     }

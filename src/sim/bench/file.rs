@@ -10,7 +10,7 @@ use crate::device::scalar::Scalar;
 use crate::device::unit::Unit;
 use crate::sim::data::{Form, SimChannel};
 use crate::sim::model::{Direction, Overload};
-use crate::sim::setup::{Oddities, OfflineAfter, Setup};
+use crate::sim::setup::{OfflineAfter, Setup, SimulatedFaults};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -211,7 +211,7 @@ impl DeviceEntry {
         setup.node = self.node;
         let named = |error| BenchError::Usage(format!("{}: {error}", self.name()));
         setup.bit_rate = self.bit_rate.map(check_rate).transpose().map_err(named)?;
-        setup.oddities = Oddities {
+        setup.oddities = SimulatedFaults {
             latency: self.latency,
             lose: self.lss.lose.clone(),
             late: self.lss.late.iter().map(|(service, late)| (service.0, late.0)).collect(),

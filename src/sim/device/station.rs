@@ -88,7 +88,7 @@ impl Device {
     fn process(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
         if frame.id() == CanId::LSS_MASTER
             && !frame.is_remote()
-            && let Some(request) = frame.all_eight()
+            && let Some(request) = frame.as_eight_bytes()
         {
             // While a device changes its bit rate, it accepts only the return to waiting state.
             let is_retiming = matches!(self.phase, Phase::Retiming { .. });
@@ -112,7 +112,7 @@ impl Device {
             }
         } else if frame.id() == CanId::sdo_request(self.memory.node)
             && state != State::Stopped
-            && let Some(request) = frame.all_eight()
+            && let Some(request) = frame.as_eight_bytes()
         {
             self.serve(request, now, out);
         }

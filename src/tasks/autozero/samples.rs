@@ -2,8 +2,8 @@
 
 use crate::bus::Received;
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::Life;
-use crate::master::{Error, Happening, Master, Request};
+use crate::canopen::nmt::ErrorControlMessage;
+use crate::master::{Error, Master, MasterEvent, Request};
 use crate::measure::decode::Wanted;
 use crate::measure::sample::{Doubt, Status};
 use crate::measure::statistics::Statistics;
@@ -39,13 +39,13 @@ impl Samples {
     }
 
     fn watch(&mut self, node: NodeId, received: &Received) {
-        self.booted |= Life::parse(&received.frame) == Some((node, Life::BootUp));
+        self.booted |= ErrorControlMessage::parse(&received.frame) == Some((node, ErrorControlMessage::BootUp));
     }
 
     fn pause(&mut self, master: &mut Master<'_>, node: NodeId) -> Result<(), Error> {
         let until = master.now() + READING_INTERVAL;
         wait(master, until, Policy::Command, |_, event| {
-            if let Happening::Frame(received) = event {
+            if let MasterEvent::Frame(received) = event {
                 self.watch(node, &received);
             }
             ControlFlow::<()>::Continue(())

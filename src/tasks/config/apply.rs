@@ -56,7 +56,7 @@ pub struct Row {
 
 /// The result for one device.
 #[derive(Clone, Debug)]
-pub struct Applied {
+pub struct ApplyReport {
     /// The node-ID before the change.
     pub node: NodeId,
     /// The settings before the change.
@@ -134,7 +134,7 @@ pub fn apply(
     options: &Options,
     overrides: &Overrides,
     journal: &mut dyn Journal,
-) -> Result<Applied, Failure> {
+) -> Result<ApplyReport, Failure> {
     if options.store || options.sections.address {
         check_confirmed(Some(before.node.id), before.node.model.as_deref())?;
     }
@@ -165,7 +165,7 @@ pub fn apply(
     journal.finish();
     let rows = work.rows();
     let Work { before, now, notes, stored, is_reset, .. } = work;
-    Ok(Applied { node: before.node.id, before, after: now, rows, stored, is_reset, notes })
+    Ok(ApplyReport { node: before.node.id, before, after: now, rows, stored, is_reset, notes })
 }
 
 struct Work<'m, 'bus> {

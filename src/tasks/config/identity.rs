@@ -67,7 +67,7 @@ fn ranges(node: &Node) -> Vec<RangeObjects> {
         // A span that can be changed is a setting, not a measuring range.
         let span = span.filter(|(_, end)| node.is_read_only(*end));
         let width = node.object_of(signal, "pressure-span").filter(|object| node.is_read_only(*object));
-        let [first, last] = [0x121, 0x123].map(|low| has(node.in_family(signal, low)));
+        let [first, last] = [0x121, 0x123].map(|low| has(node.object_in_family(signal, low)));
         all.extend(match (range, span, width, first.zip(last)) {
             (Some(range), ..) => Some(places(Some(range.start), range.end, Some(range.unit))),
             (_, Some((start, end)), ..) => Some(places(Some(start), end, None)),

@@ -19,7 +19,7 @@ pub mod setting;
 mod snapshot;
 pub mod value;
 
-pub use apply::{Applied, Journal, Options, Row as ChangedRow, apply, targets};
+pub use apply::{ApplyReport, Journal, Options, Row as ChangedRow, apply, targets};
 pub use arrivals::{Arrivals, assign_first};
 pub use check::{FileSettings, Sections, Wanted, check};
 pub use conditions::check_device;

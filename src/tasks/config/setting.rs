@@ -144,7 +144,7 @@ fn candidates(node: &Node) -> Vec<Entry> {
     let communication = COMMUNICATION_OBJECTS.iter().map(|&index| ObjectId::new(index, 0));
     let family = |signal: &Signal, low: u16| match low {
         0x110..=0x114 | 0x131 | 0x132 | 0x1a0 | 0x1a1 => ObjectId::new(0x6000 | low, signal.channel),
-        _ => node.in_family(signal, low),
+        _ => node.object_in_family(signal, low),
     };
     let channel = node.signals.iter().flat_map(|signal| CHANNEL_OBJECTS.map(|(low, ..)| family(signal, low)));
     let entry = |object: ObjectId| {

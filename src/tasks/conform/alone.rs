@@ -3,7 +3,7 @@
 use super::failure::ConformFailure;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
-use crate::master::{Happening, Master};
+use crate::master::{Master, MasterEvent};
 use crate::node::wait::{Policy, wait};
 use crate::node::{Error, Node, scan};
 use std::ops::ControlFlow;
@@ -23,7 +23,7 @@ pub(super) fn others(master: &mut Master<'_>, node: &Node) -> Result<Option<Conf
     let mut frame = None;
     let until = master.now() + LISTEN;
     wait(master, until, Policy::Command, |_, event| match event {
-        Happening::Frame(received) if !is_from(node, &received.frame) => {
+        MasterEvent::Frame(received) if !is_from(node, &received.frame) => {
             frame = Some(received.frame);
             ControlFlow::Break(())
         }

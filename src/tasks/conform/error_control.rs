@@ -7,7 +7,7 @@ use crate::bus::Received;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
-use crate::canopen::nmt::{Life, NmtCommand, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::node::Error;
 use crate::node::state::HEARTBEAT_TIME;
@@ -251,9 +251,9 @@ fn life_time(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
         return Ok(Verdict::Pass);
     }
     let answer = guard(session)?;
-    let state = answer.as_ref().and_then(Life::parse).map(|(_, life)| match life {
-        Life::State(state) => state,
-        Life::BootUp => NmtState::Other(0),
+    let state = answer.as_ref().and_then(ErrorControlMessage::parse).map(|(_, life)| match life {
+        ErrorControlMessage::State(state) => state,
+        ErrorControlMessage::BootUp => NmtState::Other(0),
     });
     let is_event = state == Some(NmtState::PreOperational);
     Ok(Verdict::of((!is_event).then(|| Finding::new(Expected::LifeGuardingEvent, Seen::State(state)))))

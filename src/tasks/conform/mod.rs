@@ -35,7 +35,7 @@ use crate::canopen::object::ObjectId;
 use crate::device::description::Deviation;
 use crate::device::eds::Eds;
 use crate::master::Master;
-pub use crate::master::{Exchanged, Transcript};
+pub use crate::master::{RecordedFrame, Transcript};
 use crate::node::{Error, Node, Overrides, state};
 use crate::tasks::config::{self, Journal};
 use crate::tasks::settings::open;

@@ -6,7 +6,7 @@ use super::session::{SETTLE, Session};
 use crate::bus::Received;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
-use crate::canopen::nmt::{Life, NmtCommand, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::node::Error;
 use crate::node::state::{BOOT_TIMEOUT, HEARTBEAT_TIME};
@@ -72,7 +72,9 @@ pub(super) const CASES: &[Case] = &[
 /// Boot-up messages: their number and form.
 fn boot_up(session: &mut Session<'_, '_>, command: NmtCommand) -> Result<Verdict, Error> {
     let lives = session.reset(command)?;
-    let is_boot_up = |received: &&Received| Life::parse(&received.frame).is_some_and(|(_, life)| life == Life::BootUp);
+    let is_boot_up = |received: &&Received| {
+        ErrorControlMessage::parse(&received.frame).is_some_and(|(_, life)| life == ErrorControlMessage::BootUp)
+    };
     let Some(first) = lives.iter().find(is_boot_up) else {
         return Ok(Verdict::of([Finding::new(Expected::BootUp, Seen::Nothing(BOOT_TIMEOUT))]));
     };

@@ -4,12 +4,12 @@ use super::settings::Settings;
 use crate::bus::Received;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
-use crate::canopen::nmt::{Life, NmtCommand, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::device::description::SizeIndication;
 use crate::device::eds::Eds;
-use crate::master::{Happening, Master, Request, SdoFailure};
+use crate::master::{Master, MasterEvent, Request, SdoFailure};
 use crate::node::state::{BOOT_TIMEOUT, HEARTBEAT_TIME};
 use crate::node::wait::{Policy, wait};
 use crate::node::{Error, Node};
@@ -197,7 +197,7 @@ impl Session<'_, '_> {
     ) -> Result<bool, Error> {
         let until = self.master.now() + time;
         let waited = wait(self.master, until, Policy::Command, |_, event| match event {
-            Happening::Frame(received) if is_last(&received) => ControlFlow::Break(()),
+            MasterEvent::Frame(received) if is_last(&received) => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
         })?;
         Ok(waited.done().is_some())
@@ -219,12 +219,14 @@ impl Session<'_, '_> {
     /// Waits for a heartbeat with this state. Returns the last state that was received.
     pub(super) fn await_state(&mut self, wanted: NmtState) -> Result<Option<NmtState>, Error> {
         let (node, mut last) = (self.node.id, None);
-        self.collect_until(STATE_PERIOD * 3 + REACTION, |received| match Life::parse(&received.frame) {
-            Some((id, Life::State(state))) if id == node => {
-                last = Some(state);
-                state == wanted
+        self.collect_until(STATE_PERIOD * 3 + REACTION, |received| {
+            match ErrorControlMessage::parse(&received.frame) {
+                Some((id, ErrorControlMessage::State(state))) if id == node => {
+                    last = Some(state);
+                    state == wanted
+                }
+                _ => false,
             }
-            _ => false,
         })?;
         Ok(last)
     }
@@ -241,7 +243,7 @@ impl Session<'_, '_> {
             if received.frame.id() == heartbeat && !received.frame.is_remote() {
                 lives.push(*received);
             }
-            matches!(Life::parse(&received.frame), Some((node, Life::BootUp)) if node == id)
+            matches!(ErrorControlMessage::parse(&received.frame), Some((node, ErrorControlMessage::BootUp)) if node == id)
         })?;
         Ok(lives)
     }

@@ -11,7 +11,7 @@ use super::session::{Session, request};
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
-use crate::canopen::nmt::{Life, NmtCommand};
+use crate::canopen::nmt::{ErrorControlMessage, NmtCommand};
 use crate::canopen::object::ObjectId;
 use crate::node::Error;
 use crate::node::state::HEARTBEAT_TIME;
@@ -142,7 +142,8 @@ fn boot(session: &mut Session<'_, '_>, command: NmtCommand) -> Result<Verdict, E
     for _ in 0..RESETS {
         let start = session.master.now();
         let lives = session.reset(command)?;
-        let is_boot_up = |one: &&Received| matches!(Life::parse(&one.frame), Some((_, Life::BootUp)));
+        let is_boot_up =
+            |one: &&Received| matches!(ErrorControlMessage::parse(&one.frame), Some((_, ErrorControlMessage::BootUp)));
         times.extend(lives.iter().find(is_boot_up).map(|one| one.at.mono.since(start)));
     }
     Ok(measured(&times, &[Statistic::Min, Statistic::Median, Statistic::Max], WhyNot::NoState))

@@ -5,7 +5,7 @@ use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::Transmission;
 use crate::device::profiles;
-use crate::master::{Answer, Error, Happening, Master, Request, SdoError, SdoFailure, Ticket};
+use crate::master::{Answer, Error, Master, MasterEvent, Request, SdoError, SdoFailure, Ticket};
 use crate::measure::layout::{PROCESS_VALUES, Tpdo};
 use crate::node::Node;
 use crate::node::state::{Proof, states};
@@ -156,7 +156,7 @@ impl Inquiry {
         let mut inquiry = Inquiry::begin(master, asked);
         let until = master.now() + INQUIRY_LIMIT;
         let waited = wait(master, until, Policy::Command, |master, event| match event {
-            Happening::Sdo(ticket, result) => match inquiry.take(ticket, &result, master) {
+            MasterEvent::Sdo(ticket, result) => match inquiry.take(ticket, &result, master) {
                 Some(findings) => ControlFlow::Break(findings),
                 None => ControlFlow::Continue(()),
             },

@@ -4,7 +4,7 @@ use super::{LogFailure, LogOptions, Mode};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::booted;
 use crate::canopen::pdo::Transmission;
-use crate::master::{Happening, Master};
+use crate::master::{Master, MasterEvent};
 use crate::measure::decode::Wanted;
 use crate::measure::layout::{Signal, Tpdo};
 use crate::node::Node;
@@ -115,10 +115,10 @@ pub(super) fn refuse_second_sync(
     let length = (period * 3).clamp(Duration::from_millis(200), Duration::from_secs(2));
     let until = master.now() + length;
     let second_sync = wait(master, until, Policy::Command, |_, event| match event {
-        Happening::Frame(received) if ids.contains(&received.frame.id()) && !received.frame.is_remote() => {
+        MasterEvent::Frame(received) if ids.contains(&received.frame.id()) && !received.frame.is_remote() => {
             ControlFlow::Break(())
         }
-        Happening::Frame(received) => {
+        MasterEvent::Frame(received) => {
             restarted.extend(booted(&received.frame));
             ControlFlow::Continue(())
         }

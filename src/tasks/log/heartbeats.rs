@@ -2,7 +2,7 @@
 
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::{Life, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtState};
 use crate::node::Node;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -48,14 +48,14 @@ impl HeartbeatMonitor {
     }
 
     /// Handles a heartbeat or boot-up message.
-    pub(super) fn on_life(&mut self, node: NodeId, life: Life, now: Mono) -> HeartbeatChange {
+    pub(super) fn on_life(&mut self, node: NodeId, life: ErrorControlMessage, now: Mono) -> HeartbeatChange {
         let Some(heartbeat) = self.heartbeats.get_mut(&node) else { return HeartbeatChange::None };
         heartbeat.last = now;
         let was_lost = std::mem::take(&mut heartbeat.is_lost);
         let state = match life {
-            Life::State(state) => Some(state),
+            ErrorControlMessage::State(state) => Some(state),
             // A boot-up message does not show the following state.
-            Life::BootUp => None,
+            ErrorControlMessage::BootUp => None,
         };
         let before = std::mem::replace(&mut heartbeat.state, state);
         match (before, state) {
@@ -101,15 +101,15 @@ mod tests {
         assert_eq!(monitor.next_lost(at(1_000_000)), None, "it has none");
         recorded.heartbeat_ms = Some(100);
         monitor.watch(&recorded, at(0));
-        let operational = Life::State(NmtState::Operational);
-        let stopped = Life::State(NmtState::Stopped);
+        let operational = ErrorControlMessage::State(NmtState::Operational);
+        let stopped = ErrorControlMessage::State(NmtState::Stopped);
         assert_eq!(monitor.on_life(node, operational, at(100)), HeartbeatChange::None);
         assert_eq!(monitor.on_life(node, stopped, at(200)), HeartbeatChange::State(NmtState::Stopped));
         assert_eq!(monitor.next_lost(at(450)), None);
         assert_eq!(monitor.next_lost(at(451)), Some((node, Duration::from_millis(251))));
         assert_eq!(monitor.next_lost(at(600)), None, "returned once");
         assert_eq!(monitor.on_life(node, operational, at(700)), HeartbeatChange::Back);
-        assert_eq!(monitor.on_life(node, Life::BootUp, at(750)), HeartbeatChange::None);
+        assert_eq!(monitor.on_life(node, ErrorControlMessage::BootUp, at(750)), HeartbeatChange::None);
         assert_eq!(
             monitor.on_life(node, operational, at(800)),
             HeartbeatChange::None,

@@ -28,7 +28,7 @@ pub(in crate::tasks) struct SetupListener {
     /// Descriptions of devices whose identity is known from another source.
     pub(in crate::tasks) recognised: Overrides,
     /// COB-IDs of TPDOs whose mapping is unknown, and the nodes that sent them.
-    pub(in crate::tasks) not_understood: BTreeMap<CanId, NodeId>,
+    pub(in crate::tasks) unknown_mappings: BTreeMap<CanId, NodeId>,
 }
 
 impl SetupListener {
@@ -39,7 +39,7 @@ impl SetupListener {
             wanted: wanted.to_vec(),
             overheard: Overheard::default(),
             recognised: Overrides::new(),
-            not_understood: BTreeMap::new(),
+            unknown_mappings: BTreeMap::new(),
         }
     }
 
@@ -61,7 +61,7 @@ impl SetupListener {
             && !decoder.decodes(frame.id())
             && self.nodes.contains(&node)
         {
-            self.not_understood.insert(frame.id(), node);
+            self.unknown_mappings.insert(frame.id(), node);
         }
         None
     }
@@ -131,7 +131,7 @@ impl SetupListener {
         node.tpdos = tpdos;
         if !node.tpdos.is_empty() {
             decoder.replace(node.layout(), &node.all_wanted(&self.wanted));
-            self.not_understood.retain(|&id, _| !decoder.decodes(id));
+            self.unknown_mappings.retain(|&id, _| !decoder.decodes(id));
         }
     }
 

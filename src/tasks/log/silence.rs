@@ -46,7 +46,7 @@ pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Fa
     if let Some(failure) = recording.two_devices.values().next() {
         return failure.clone();
     }
-    if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.values().min()) {
+    if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.unknown_mappings.values().min()) {
         return Failure::at(node, LogFailure::UnknownMapping);
     }
     if recording.listener.is_some()

@@ -2,9 +2,9 @@
 
 use super::{LogOptions, Mode, Remark};
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::{Life, NmtCommand, NmtState, booted};
+use crate::canopen::nmt::{ErrorControlMessage, NmtCommand, NmtState, booted};
 use crate::device::profiles;
-use crate::master::{Error, Happening, Master};
+use crate::master::{Error, Master, MasterEvent};
 use crate::node::Node;
 use crate::node::wait::{Policy, wait};
 use crate::tasks::nmt::NmtFailure;
@@ -110,8 +110,8 @@ impl NmtStates {
         let (mut asked_again, mut other_states) = (BTreeSet::new(), BTreeMap::new());
         let until = master.now() + CONFIRMATION_TIMEOUT;
         wait(master, until, Policy::Observe, |master, event| {
-            if let Happening::Frame(received) = event
-                && let Some((node, Life::State(state))) = Life::parse(&received.frame)
+            if let MasterEvent::Frame(received) = event
+                && let Some((node, ErrorControlMessage::State(state))) = ErrorControlMessage::parse(&received.frame)
                 && let Some(&command) = unconfirmed.get(&node)
             {
                 if state == command.target() {
@@ -176,9 +176,9 @@ fn heartbeats(
     let Some(longest) = expected.values().max() else { return Ok(known) };
     let until = master.now() + *longest * 3 / 2;
     wait(master, until, Policy::Command, |_, event| {
-        if let Happening::Frame(received) = event {
+        if let MasterEvent::Frame(received) = event {
             restarted.extend(booted(&received.frame));
-            if let Some((node, Life::State(state))) = Life::parse(&received.frame)
+            if let Some((node, ErrorControlMessage::State(state))) = ErrorControlMessage::parse(&received.frame)
                 && expected.contains_key(&node)
             {
                 known.insert(node, state);

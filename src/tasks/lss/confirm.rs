@@ -5,8 +5,8 @@ use super::failure::{LssCause, LssFailure};
 use super::node_id::{AnsweringDevices, answering_devices};
 use crate::bus::{Filters, Mono};
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::{Life, NmtCommand};
-use crate::master::{Error, Happening, Master};
+use crate::canopen::nmt::{ErrorControlMessage, NmtCommand};
+use crate::master::{Error, Master, MasterEvent};
 use crate::node::wait::{Policy, pause, wait};
 use crate::tasks::Failure;
 use std::ops::ControlFlow;
@@ -84,7 +84,9 @@ pub(super) fn confirm(
 fn wait_for_boot_up(master: &mut Master<'_>, new: NodeId, start: Mono) -> Result<Option<Duration>, Error> {
     let until = start + BOOT_TIMEOUT.max(master.timing().timeout);
     let booted = wait(master, until, Policy::Command, |_, event| match event {
-        Happening::Frame(received) if Life::parse(&received.frame) == Some((new, Life::BootUp)) => {
+        MasterEvent::Frame(received)
+            if ErrorControlMessage::parse(&received.frame) == Some((new, ErrorControlMessage::BootUp)) =>
+        {
             ControlFlow::Break(received.at.mono.since(start))
         }
         _ => ControlFlow::Continue(()),

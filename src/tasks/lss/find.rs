@@ -67,7 +67,7 @@ pub fn scan(master: &mut Master<'_>, times: SearchTimes, notify: Notify<'_>) -> 
         .collect();
     master.listen(&Filters::All)?;
     let mut lss = master.lss();
-    let unconfigured = match lss.is_anyone_unconfigured(asked, times.first) {
+    let unconfigured = match lss.has_unconfigured_slave(asked, times.first) {
         Ok(true) => find_unconfigured(&mut lss, times.further, notify),
         Ok(false) => Ok(Vec::new()),
         Err(error) => Err(error),
@@ -90,7 +90,7 @@ fn find_unconfigured(
 ) -> Result<Vec<LssAddress>, LssError> {
     let mut found: Vec<LssAddress> = Vec::new();
     loop {
-        let reason = match lss.fastscan_beside(&found, further.filter(|_| !found.is_empty())) {
+        let reason = match lss.fastscan_excluding(&found, further.filter(|_| !found.is_empty())) {
             Ok(None) => return Ok(found),
             Ok(Some(address)) if !found.contains(&address) => {
                 found.push(address);

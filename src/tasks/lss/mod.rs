@@ -38,7 +38,7 @@ pub use find::{FoundSlave, SearchTimes, identify, scan};
 pub use method::{PlannedRate, RequestedRate, check_rate, check_store};
 pub use node_id::{DuplicateSign, TakenSign};
 pub use progress::{Progress, Stage};
-pub use services::{Inquired, activate, inquire, store};
+pub use services::{InquireReport, activate, inquire, store};
 
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddressError;

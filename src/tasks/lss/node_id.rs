@@ -7,7 +7,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
-use crate::master::{Error, Happening, Master, Request, SdoError, SdoFailure};
+use crate::master::{Error, Master, MasterEvent, Request, SdoError, SdoFailure};
 use crate::node::wait::{Policy, wait};
 use crate::tasks::Failure;
 use std::ops::ControlFlow;
@@ -131,12 +131,12 @@ impl SdoMonitor {
         }
     }
 
-    fn on_event(&mut self, event: &Happening) {
+    fn on_event(&mut self, event: &MasterEvent) {
         match event {
-            Happening::Frame(received) => {
+            MasterEvent::Frame(received) => {
                 self.has_other_master |= received.frame.id().sdo_request_node() == Some(self.node);
             }
-            Happening::Fault(fault, _) => self.has_collision |= is_collision(*fault),
+            MasterEvent::Fault(fault, _) => self.has_collision |= is_collision(*fault),
             _ => {}
         }
     }
@@ -147,7 +147,7 @@ impl SdoMonitor {
         let request = master.start(Request::read(node, object));
         let until = master.now() + MAX_TRANSFER_TIME;
         let answer = wait(master, until, Policy::Command, |_, event| match event {
-            Happening::Sdo(ticket, result) if ticket == request => ControlFlow::Break(result),
+            MasterEvent::Sdo(ticket, result) if ticket == request => ControlFlow::Break(result),
             event => {
                 self.on_event(&event);
                 ControlFlow::Continue(())
@@ -217,7 +217,7 @@ fn ask_twice(master: &mut Master<'_>, node: NodeId, timeout: Duration) -> Result
     let tickets = requests.map(|request| master.start(request));
     let mut unanswered = tickets.len();
     wait(master, start + MAX_TRANSFER_TIME, Policy::Command, |master, event| {
-        unanswered -= usize::from(matches!(event, Happening::Sdo(ticket, _) if tickets.contains(&ticket)));
+        unanswered -= usize::from(matches!(event, MasterEvent::Sdo(ticket, _) if tickets.contains(&ticket)));
         let is_found = master.has_answered_since(node, start) || master.has_heartbeat_since(node, start);
         if unanswered == 0 || is_found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;

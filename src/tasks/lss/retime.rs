@@ -16,7 +16,7 @@ use crate::bus::{Filters, Mono};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtCommand;
 use crate::device::assign::{Applies, AssignEntry, AssignKind, RateTable};
-use crate::master::{Happening, Master};
+use crate::master::{Master, MasterEvent};
 use crate::node::wait::{Policy, pause, wait};
 use crate::tasks::host::{HostAction, not_set};
 use crate::tasks::{Effect, Failure, Kind};
@@ -230,7 +230,7 @@ fn check_alone(master: &mut Master<'_>, device: &LssDevice) -> Result<(), Failur
     }
     let until = master.now() + LISTEN_TIME;
     let sender = wait(master, until, Policy::Command, |_, event| match event {
-        Happening::Frame(received) if !may_be_of(received.frame.id(), device.node) => {
+        MasterEvent::Frame(received) if !may_be_of(received.frame.id(), device.node) => {
             ControlFlow::Break(received.frame.id())
         }
         _ => ControlFlow::Continue(()),

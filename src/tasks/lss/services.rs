@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// The identity and node-ID that a slave reports.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Inquired {
+pub struct InquireReport {
     /// The device as the user named it.
     pub target: Target,
     /// Its identity; `None` if it does not support the inquiry.
@@ -33,7 +33,7 @@ pub fn inquire(
     target: &Target,
     descriptions: &Descriptions<'_>,
     notify: Notify<'_>,
-) -> Result<Inquired, Failure> {
+) -> Result<InquireReport, Failure> {
     let device = resolve(master, target, descriptions, (Via::Lss, false), notify)?;
     let mut others = Vec::new();
     let (address, node) = with_device(master, &device, notify, |lss| {
@@ -47,7 +47,7 @@ pub fn inquire(
     if address.is_none() && node.is_none() {
         return Err(device.failure(LssCause::NoInquiry));
     }
-    Ok(Inquired { target: target.clone(), address, node })
+    Ok(InquireReport { target: target.clone(), address, node })
 }
 
 /// Returns the answer, or `None` if the slave does not answer. If it sent another frame instead, the error is added to

@@ -9,7 +9,7 @@ use super::nodes;
 use super::session::in_configuration_state;
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::{LssAddress, Part};
-use crate::master::lss::{Gathered, Others};
+use crate::master::lss::{GatheredAnswers, Others};
 use crate::master::{Lss, LssError, Master};
 use crate::tasks::Failure;
 
@@ -130,7 +130,7 @@ fn ask_all(lss: &mut Lss<'_, '_>, known: Option<LssAddress>) -> Result<SlaveAnsw
 }
 
 /// Returns `None` if no slave answers, because not every slave supports every service.
-fn unless_silent<T>(gathered: Result<Gathered<T>, LssError>) -> Result<Option<Gathered<T>>, LssError> {
+fn unless_silent<T>(gathered: Result<GatheredAnswers<T>, LssError>) -> Result<Option<GatheredAnswers<T>>, LssError> {
     match gathered {
         Ok(gathered) => Ok(Some(gathered)),
         Err(LssError::NoAnswer { .. }) => Ok(None),

@@ -6,7 +6,7 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss;
-use crate::canopen::nmt::{Life, NmtCommand, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, TpdoNumber};
 use crate::canopen::sdo::{FitError, Note, Uploaded, fit};
@@ -89,7 +89,7 @@ impl Interpreter {
 
     /// Returns the COB-IDs of TPDOs whose mapping is unknown, and their nodes.
     pub fn not_decoded(&self) -> BTreeMap<CanId, NodeId> {
-        self.setup.not_understood.clone()
+        self.setup.unknown_mappings.clone()
     }
 
     /// Returns when the next SDO transfer without an answer ends.
@@ -207,8 +207,10 @@ impl Interpreter {
         if let (Some(node), true) = (frame.id().heartbeat_node(), frame.is_remote()) {
             return Some((Some(node), FrameKind::Guarding, Content::GuardingRequest));
         }
-        let (node, life) = Life::parse(frame)?;
-        let Life::State(state) = life else { return Some((Some(node), FrameKind::BootUp, Content::BootUp)) };
+        let (node, life) = ErrorControlMessage::parse(frame)?;
+        let ErrorControlMessage::State(state) = life else {
+            return Some((Some(node), FrameKind::BootUp, Content::BootUp));
+        };
         let guarding = self.guarding.get(&node).filter(|guarding| guarding.is_asked);
         Some(match (guarding, frame.data()) {
             (Some(guarding), [code, ..]) => {

@@ -3,7 +3,7 @@
 use crate::canopen::value::DataType;
 use crate::master::{Error as MasterError, Master, SdoError, SdoFailure};
 use crate::node::read::read_values;
-use crate::node::state::{HEARTBEAT_TIME, LifeWatch, Proof, StateReport};
+use crate::node::state::{ErrorControlWatch, HEARTBEAT_TIME, Proof, StateReport};
 use crate::node::write::{verify, write};
 use crate::node::{Error, Node};
 use crate::tasks::Failure;
@@ -25,12 +25,12 @@ pub struct Probe {
     /// Why the probe failed.
     pub failure: Option<Failure>,
     /// The value of 1017h in milliseconds after the probe, if it was not restored.
-    pub left: Option<LeftHeartbeat>,
+    pub left: Option<UnrestoredHeartbeat>,
 }
 
 /// A heartbeat time that was not restored after a probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LeftHeartbeat {
+pub struct UnrestoredHeartbeat {
     /// The heartbeat time in milliseconds.
     pub milliseconds: u16,
     /// The heartbeat time before the probe in milliseconds.
@@ -61,7 +61,7 @@ pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) ->
         journal.remove(&temporary);
         return Ok(failed(error.into()));
     }
-    let mut watch = LifeWatch::default();
+    let mut watch = ErrorControlWatch::default();
     let waited = match &set {
         Ok(_) => {
             let until = master.now() + PROBE_PERIOD + master.timing().timeout;
@@ -78,7 +78,7 @@ pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) ->
         _ => None,
     };
     let is_certain = milliseconds.is_some() || set.is_ok() && !is_acknowledged;
-    let left = LeftHeartbeat { milliseconds: milliseconds.unwrap_or(probe_time), before, is_certain };
+    let left = UnrestoredHeartbeat { milliseconds: milliseconds.unwrap_or(probe_time), before, is_certain };
     let failure = node_failure(set)?;
     waited?;
     let (failure, left) = match node_failure(restored)? {

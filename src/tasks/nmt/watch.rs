@@ -2,9 +2,9 @@
 
 use crate::bus::{Mono, Stamp};
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::{Life, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtState};
 use crate::canopen::value::DataType;
-use crate::master::{Answer, Error, Happening, Master, Request, SdoError, Ticket};
+use crate::master::{Answer, Error, Master, MasterEvent, Request, SdoError, Ticket};
 use crate::node::state::HEARTBEAT_TIME;
 use crate::node::wait::{Policy, Until, Waiter, run};
 use std::collections::BTreeMap;
@@ -103,19 +103,19 @@ impl Waiter for Watcher<'_> {
         Until::Deadline(self.deadline())
     }
 
-    fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Error> {
+    fn on_event(&mut self, master: &mut Master<'_>, event: MasterEvent) -> Result<ControlFlow<()>, Error> {
         let state_event = match event {
-            Happening::Frame(received) => Life::parse(&received.frame).and_then(|(node, life)| {
+            MasterEvent::Frame(received) => ErrorControlMessage::parse(&received.frame).and_then(|(node, life)| {
                 let change = self.heartbeats.get_mut(&node)?.on_life(life, received.at.mono)?;
                 Some(StateEvent { at: received.at, node, change })
             }),
-            Happening::Sdo(ticket, result) => {
+            MasterEvent::Sdo(ticket, result) => {
                 self.on_answer(ticket, result);
                 None
             }
-            Happening::Deadline if self.deadline() >= self.end => return Ok(ControlFlow::Break(())),
-            Happening::Deadline => self.mark_lost(master.bus().now()),
-            Happening::Interrupted | Happening::Ended => return Ok(ControlFlow::Break(())),
+            MasterEvent::Deadline if self.deadline() >= self.end => return Ok(ControlFlow::Break(())),
+            MasterEvent::Deadline => self.mark_lost(master.bus().now()),
+            MasterEvent::Interrupted | MasterEvent::Ended => return Ok(ControlFlow::Break(())),
             _ => None,
         };
         Ok(state_event.map_or(ControlFlow::Continue(()), |state_event| (self.on_change)(&state_event)))
@@ -141,14 +141,14 @@ impl Heartbeat {
         }
     }
 
-    fn on_life(&mut self, life: Life, at: Mono) -> Option<Change> {
+    fn on_life(&mut self, life: ErrorControlMessage, at: Mono) -> Option<Change> {
         let state = match life {
-            Life::BootUp => {
+            ErrorControlMessage::BootUp => {
                 // The time from the last heartbeat to the first one after a restart is not an interval.
                 *self = Heartbeat { period: self.period, ..Heartbeat::default() };
                 return Some(Change::BootUp);
             }
-            Life::State(state) => state,
+            ErrorControlMessage::State(state) => state,
         };
         if let (Some(last), false) = (self.last, self.is_lost) {
             let interval = at.since(last);
@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn a_node_is_lost_after_twice_the_learned_period() {
         let mut heartbeat = Heartbeat::default();
-        let operational = Life::State(NmtState::Operational);
+        let operational = ErrorControlMessage::State(NmtState::Operational);
         assert_eq!(heartbeat.on_life(operational, at(0)), Some(Change::State(NmtState::Operational)));
         assert_eq!(heartbeat.lost_at(), None);
         assert_eq!(heartbeat.on_life(operational, at(1000)), None);
@@ -185,9 +185,9 @@ mod tests {
         // The silence of a lost node is not an interval.
         assert_eq!(heartbeat.on_life(operational, at(60_000)), Some(Change::Back(NmtState::Operational)));
         assert_eq!(heartbeat.lost_at(), Some(at(62_050)));
-        assert_eq!(heartbeat.on_life(Life::BootUp, at(61_000)), Some(Change::BootUp));
+        assert_eq!(heartbeat.on_life(ErrorControlMessage::BootUp, at(61_000)), Some(Change::BootUp));
         assert_eq!(heartbeat.lost_at(), None);
-        let stopped = Life::State(NmtState::Stopped);
+        let stopped = ErrorControlMessage::State(NmtState::Stopped);
         assert_eq!(heartbeat.on_life(stopped, at(61_500)), Some(Change::State(NmtState::Stopped)));
     }
 }

@@ -7,7 +7,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, TpdoNumber};
 use crate::canopen::value::DataType;
-use crate::master::Happening;
+use crate::master::MasterEvent;
 use crate::node::Node;
 use crate::node::read::read_values;
 use crate::node::wait::{Policy, wait};
@@ -90,7 +90,7 @@ pub(super) fn check_others(session: &mut Session<'_, '_>, id: CanId) -> Result<(
     }
     let until = master.now() + LISTEN_TIMEOUT;
     let received = wait(master, until, Policy::Command, |_, event| match event {
-        Happening::Frame(received) if received.frame.id() == id => ControlFlow::Break(()),
+        MasterEvent::Frame(received) if received.frame.id() == id => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
     })?;
     master.listen_to(&[node])?;

@@ -170,7 +170,7 @@ impl FromStr for Item {
         let bits = bits.map(number).transpose()?;
         match what.parse() {
             Ok(object) => Ok(Item::Object(object, bits)),
-            Err(_) if !what.is_empty() && !ObjectId::reads_as_address(what) => Ok(Item::Name(what.to_owned(), bits)),
+            Err(_) if !what.is_empty() && !ObjectId::looks_like_address(what) => Ok(Item::Name(what.to_owned(), bits)),
             Err(_) => Err(format!(
                 "\"{text}\" is neither a signal (pressure, ch1, pressure.status) nor an object (0x6130:1, 0x9130:1/32)"
             )),

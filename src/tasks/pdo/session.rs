@@ -2,10 +2,10 @@
 
 use super::failure::{StepError, StepWrite};
 use crate::bus::Received;
-use crate::canopen::nmt::{Life, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
-use crate::master::{Answer, Error, Happening, Master, Operation, Request, SdoError, SdoFailure};
+use crate::master::{Answer, Error, Master, MasterEvent, Operation, Request, SdoError, SdoFailure};
 use crate::node::wait::{Policy, wait};
 use crate::node::write::write_with;
 use crate::node::{self, Node, Repeat, WriteOptions};
@@ -37,7 +37,9 @@ impl<'a, 'bus> Session<'a, 'bus> {
     fn exchange(&mut self, object: ObjectId) -> Result<Result<Answer, SdoError>, Error> {
         let node = self.node.id;
         let mut has_booted = false;
-        let mut watch = |received: &Received| has_booted |= Life::parse(&received.frame) == Some((node, Life::BootUp));
+        let mut watch = |received: &Received| {
+            has_booted |= ErrorControlMessage::parse(&received.frame) == Some((node, ErrorControlMessage::BootUp))
+        };
         let result = self.master.transfer(vec![Request::read(node, object)], &mut watch);
         self.has_restarted |= has_booted;
         let answer = result?.pop();
@@ -56,7 +58,9 @@ impl<'a, 'bus> Session<'a, 'bus> {
     pub(super) fn write(&mut self, write: &StepWrite) -> Result<(), StepError> {
         let node = self.node.id;
         let mut has_booted = false;
-        let mut watch = |received: &Received| has_booted |= Life::parse(&received.frame) == Some((node, Life::BootUp));
+        let mut watch = |received: &Received| {
+            has_booted |= ErrorControlMessage::parse(&received.frame) == Some((node, ErrorControlMessage::BootUp))
+        };
         let progress = &mut |_| {};
         let mut options = WriteOptions { repeat: Repeat::Once, ..WriteOptions::new(progress, &mut watch) };
         let result = write_with(self.master, self.node, write.object, &write.bytes(), &mut options);
@@ -89,15 +93,15 @@ impl<'a, 'bus> Session<'a, 'bus> {
     pub(super) fn wait_for_life(&mut self, timeout: Duration) -> Result<bool, Error> {
         let (until, own) = (self.master.now() + timeout, self.node.id);
         let life = wait(self.master, until, Policy::Reconnect, |_, event| {
-            let Happening::Frame(received) = event else { return ControlFlow::Continue(()) };
-            match Life::parse(&received.frame) {
-                Some((node, Life::State(NmtState::Stopped))) if node == own => ControlFlow::Continue(()),
+            let MasterEvent::Frame(received) = event else { return ControlFlow::Continue(()) };
+            match ErrorControlMessage::parse(&received.frame) {
+                Some((node, ErrorControlMessage::State(NmtState::Stopped))) if node == own => ControlFlow::Continue(()),
                 Some((node, life)) if node == own => ControlFlow::Break(life),
                 _ => ControlFlow::Continue(()),
             }
         })?;
         let life = life.done();
-        self.has_restarted |= life == Some(Life::BootUp);
+        self.has_restarted |= life == Some(ErrorControlMessage::BootUp);
         Ok(life.is_some())
     }
 }

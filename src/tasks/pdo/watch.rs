@@ -5,10 +5,10 @@ use crate::bus::{BusError, Filters, Mono, Received, Stamp};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
-use crate::canopen::nmt::Life;
+use crate::canopen::nmt::ErrorControlMessage;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::TpdoNumber;
-use crate::master::{Answer, Error, Happening, Master, Operation, SdoError, SdoFailure, Ticket};
+use crate::master::{Answer, Error, Master, MasterEvent, Operation, SdoError, SdoFailure, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::layout::Tpdo;
 use crate::measure::sample::{Sample, Source};
@@ -215,7 +215,7 @@ impl<'a> Watcher<'a> {
             if let Some(node) = setup.on_frame(received, &mut self.decoder) {
                 let node = setup.known_node(node);
                 self.set_up(&node);
-            } else if let Some((node, Life::BootUp)) = Life::parse(&received.frame) {
+            } else if let Some((node, ErrorControlMessage::BootUp)) = ErrorControlMessage::parse(&received.frame) {
                 setup.forget(node, &mut self.decoder);
             }
             if let Some((node, object, answers)) = self.setup.as_mut().and_then(SetupListener::next_second_answer)
@@ -349,14 +349,14 @@ impl<'a> Watcher<'a> {
         {
             self.observed.entry(node.id).or_default().0.emergency = Some(emergency.code);
         }
-        let Some((id, life)) = Life::parse(frame) else { return ControlFlow::Continue(()) };
+        let Some((id, life)) = ErrorControlMessage::parse(frame) else { return ControlFlow::Continue(()) };
         if !self.nodes.iter().any(|node| node.id == id) {
             return ControlFlow::Continue(());
         }
         let (observed, last) = self.observed.entry(id).or_default();
         *last = now;
-        observed.booted = life == Life::BootUp;
-        observed.state = if let Life::State(state) = life { Some(state) } else { None };
+        observed.booted = life == ErrorControlMessage::BootUp;
+        observed.state = if let ErrorControlMessage::State(state) = life { Some(state) } else { None };
         if observed.booted { (self.on_event)(&WatchEvent::Restarted(id)) } else { ControlFlow::Continue(()) }
     }
 
@@ -384,7 +384,7 @@ impl<'a> Watcher<'a> {
         if self.has_received {
             return Ok(ControlFlow::Break(()));
         }
-        if let Some(&node) = self.setup.as_ref().and_then(|setup| setup.not_understood.values().min()) {
+        if let Some(&node) = self.setup.as_ref().and_then(|setup| setup.unknown_mappings.values().min()) {
             return Err(Failure::at(node, LogFailure::UnknownMapping));
         }
         if self.setup.is_some() {
@@ -413,22 +413,22 @@ impl Waiter for Watcher<'_> {
         Until::Deadline(self.next)
     }
 
-    fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Failure> {
+    fn on_event(&mut self, master: &mut Master<'_>, event: MasterEvent) -> Result<ControlFlow<()>, Failure> {
         Ok(match event {
-            Happening::Frame(received) => self.on_frame(&received, master),
-            Happening::Ended => return self.result(master),
-            Happening::Deadline if self.next == self.end => return self.result(master),
-            Happening::Deadline => {
+            MasterEvent::Frame(received) => self.on_frame(&received, master),
+            MasterEvent::Ended => return self.result(master),
+            MasterEvent::Deadline if self.next == self.end => return self.result(master),
+            MasterEvent::Deadline => {
                 self.next = self.end;
                 if !self.has_received {
                     self.inquiry = Some(Inquiry::begin(master, &self.objects_to_read()));
                 }
                 ControlFlow::Continue(())
             }
-            Happening::Sdo(ticket, result) if self.rereads.values().flatten().any(|survey| survey.has(ticket)) => {
+            MasterEvent::Sdo(ticket, result) if self.rereads.values().flatten().any(|survey| survey.has(ticket)) => {
                 self.read_again(ticket, &result, master)?
             }
-            Happening::Sdo(ticket, result) => {
+            MasterEvent::Sdo(ticket, result) => {
                 let findings = self.inquiry.as_mut().and_then(|inquiry| inquiry.take(ticket, &result, master));
                 match findings {
                     Some(findings) if !self.has_received => {
@@ -438,14 +438,14 @@ impl Waiter for Watcher<'_> {
                     _ => ControlFlow::Continue(()),
                 }
             }
-            Happening::Dropped(_) => {
+            MasterEvent::Dropped(_) => {
                 self.synced.on_lost_frames();
                 ControlFlow::Continue(())
             }
-            Happening::Interrupted if self.has_received => ControlFlow::Break(()),
-            Happening::Interrupted => return Err(Error::Interrupted.into()),
-            Happening::Link(false) => return Err(BusError::Down(master.bus().name().to_owned()).into()),
-            Happening::Fault(..) | Happening::Link(true) => ControlFlow::Continue(()),
+            MasterEvent::Interrupted if self.has_received => ControlFlow::Break(()),
+            MasterEvent::Interrupted => return Err(Error::Interrupted.into()),
+            MasterEvent::Link(false) => return Err(BusError::Down(master.bus().name().to_owned()).into()),
+            MasterEvent::Fault(..) | MasterEvent::Link(true) => ControlFlow::Continue(()),
         })
     }
 }

@@ -17,7 +17,7 @@ use std::time::Duration;
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilterReport {
     /// The filter, read from the device.
-    pub filter: FilterOf,
+    pub filter: SignalFilter,
     /// Whether the filter constant (61A1h) changed with the new damping; `None` if no damping was set.
     pub damping_shown: Option<bool>,
     /// Further notes.
@@ -26,7 +26,7 @@ pub struct FilterReport {
 
 /// The filter of a signal.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FilterOf {
+pub struct SignalFilter {
     /// The node.
     pub node: NodeId,
     /// `pressure`, `ch1` …
@@ -133,12 +133,12 @@ pub fn show(master: &mut Master<'_>, node: &Node, signal: Option<&str>) -> Resul
     Ok(filters)
 }
 
-fn filter_of(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Option<FilterOf>, Failure> {
+fn filter_of(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Option<SignalFilter>, Failure> {
     let values = read_each(master, node, &[kind_object(signal), constant_object(signal)])?;
     let [code, constant] = [0, 1].map(|at| values.get(at).and_then(Option::as_ref).and_then(Value::as_u64));
     let kind = code.map(|code| meaning(node, signal, code)).unwrap_or_default();
     let is_known = code.is_some() || constant.is_some();
-    Ok(is_known.then(|| FilterOf { node: node.id, signal: signal.name.clone(), code, kind, constant }))
+    Ok(is_known.then(|| SignalFilter { node: node.id, signal: signal.name.clone(), code, kind, constant }))
 }
 
 /// Sets the filter of a signal, or of the only signal with a filter, and reads it back.
@@ -195,7 +195,7 @@ pub fn set(
 }
 
 /// Returns notes about unexpected effects of a filter, from the description.
-fn effect_notes(node: &Node, signal: &Signal, filter: &FilterOf) -> Vec<Note> {
+fn effect_notes(node: &Node, signal: &Signal, filter: &SignalFilter) -> Vec<Note> {
     let mut notes = Vec::new();
     let is_repeating = filter.kind.starts_with(FilterType::Repeating.word());
     let constant = filter.constant.filter(|_| !is_repeating);
@@ -224,7 +224,7 @@ fn damping_write(
     signal: &Signal,
     damping: Duration,
     kind: Option<u8>,
-    before: &FilterOf,
+    before: &SignalFilter,
 ) -> Result<(ObjectId, u16), Failure> {
     let name = signal.name.clone();
     let Some(object) = node.object_of(signal, "damping") else {

@@ -309,7 +309,7 @@ fn manufacturer_objects(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId
 fn span(node: &Node, signal: &Signal) -> Option<[ObjectId; 2]> {
     let described = node.model.as_ref().map_or(&[][..], |model| &model.description.signals);
     let entry = described.iter().find(|entry| entry.name == signal.name);
-    let of_channel = |low| signal.has_channel().then(|| node.in_family(signal, low));
+    let of_channel = |low| signal.has_channel().then(|| node.object_in_family(signal, low));
     let start = entry.and_then(|entry| entry.span_start).or_else(|| of_channel(0x148))?;
     let end = entry.and_then(|entry| entry.span_end).or_else(|| of_channel(0x149))?;
     Some([start, end])

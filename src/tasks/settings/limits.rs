@@ -48,7 +48,7 @@ impl Limit {
             Limit::Upper => 0x135,
             Limit::Hysteresis => 0x136,
         };
-        node.in_family(signal, low)
+        node.object_in_family(signal, low)
     }
 }
 

@@ -17,7 +17,7 @@ use crate::tasks::{Fact, Failure, Note};
 
 /// The unit of a signal.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UnitOf {
+pub struct SignalUnit {
     /// The node.
     pub node: NodeId,
     /// `pressure`, `ch1` …
@@ -36,7 +36,7 @@ pub struct UnitChange {
     /// The unit before; equal to the new unit if nothing was written.
     pub before: Unit,
     /// The unit now, read back.
-    pub now: UnitOf,
+    pub now: SignalUnit,
     /// The objects in this unit, before and after.
     pub rescaled: Vec<Rescaled>,
     /// Further notes.
@@ -98,22 +98,22 @@ const OBJECTS_IN_UNIT: [(u16, Scale); 10] = [
 ///
 /// # Errors
 /// No such signal; [`SettingsFailure::NoUnit`].
-pub fn show(node: &Node, signal: Option<&str>) -> Result<Vec<UnitOf>, Failure> {
+pub fn show(node: &Node, signal: Option<&str>) -> Result<Vec<SignalUnit>, Failure> {
     let signals: Vec<&Signal> = match signal {
         Some(name) => vec![find(node, name)?],
         None => node.signals.iter().filter(|signal| unit_object(node, signal).is_some()).collect(),
     };
-    let units: Vec<UnitOf> = signals.iter().filter_map(|signal| unit_of(node, signal)).collect();
+    let units: Vec<SignalUnit> = signals.iter().filter_map(|signal| unit_of(node, signal)).collect();
     if units.is_empty() {
         return Err(Failure::at(node.id, SettingsFailure::NoUnit { signal: None }));
     }
     Ok(units)
 }
 
-fn unit_of(node: &Node, signal: &Signal) -> Option<UnitOf> {
+fn unit_of(node: &Node, signal: &Signal) -> Option<SignalUnit> {
     let object = unit_object(node, signal);
     let allowed = object.and_then(|object| node.described(object)).map_or(&[][..], |entry| &entry.allow);
-    Some(UnitOf {
+    Some(SignalUnit {
         node: node.id,
         signal: signal.name.clone(),
         unit: signal.unit?,
@@ -164,11 +164,11 @@ pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit:
     }
     // The new unit is set, so a failure to get these warnings is ignored.
     notes.extend(Note::may_clip(node.id, narrow_values(master, node).unwrap_or_default()));
-    Ok(UnitChange { before: old.unit, now: UnitOf { unit, ..old }, rescaled, notes })
+    Ok(UnitChange { before: old.unit, now: SignalUnit { unit, ..old }, rescaled, notes })
 }
 
 /// Checks that the description allows the new unit. Returns the object to write.
-fn check_accepted(node: &Node, signal: &Signal, old: &UnitOf, unit: Unit) -> Result<ObjectId, Failure> {
+fn check_accepted(node: &Node, signal: &Signal, old: &SignalUnit, unit: Unit) -> Result<ObjectId, Failure> {
     let name = old.signal.clone();
     let fixed = SettingsFailure::UnitFixed { signal: name.clone(), unit: old.unit };
     let Some(object) = unit_object(node, signal) else { return Err(Failure::at(node.id, fixed)) };

@@ -224,7 +224,7 @@ pub(super) fn last_writes(spec: &Spec, run: &mut Run, violations: &mut Vec<Viola
     }
     let mut last: BTreeMap<(u8, ObjectId), Vec<u8>> = BTreeMap::new();
     for (_, frame) in run.bus.all_sent() {
-        let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight()) else { continue };
+        let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.as_eight_bytes()) else { continue };
         if data[0] >> 5 == 1 && data[0] & 3 == 3 && !is_signature(&data[4..8]) {
             let length = 4 - usize::from(data[0] >> 2 & 3);
             let object = ObjectId::from_multiplexer([data[1], data[2], data[3]]);

@@ -66,7 +66,7 @@ fn duplicate_id(node: u8, run: &Run, violations: &mut Vec<Violation>) {
     if let Ok(Claim::Values(values)) = &run.result {
         let contents = |object: ObjectId| {
             let [low, high] = object.index.to_le_bytes();
-            let data = answers.iter().filter_map(|(_, frame)| frame.all_eight());
+            let data = answers.iter().filter_map(|(_, frame)| frame.as_eight_bytes());
             let data = data.filter(|data| data[1..4] == [low, high, object.sub]);
             data.map(|data| data[4..].to_vec()).collect::<BTreeSet<_>>()
         };

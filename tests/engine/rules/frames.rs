@@ -98,7 +98,7 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, vio
                 );
                 (guards || lss) && id.heartbeat_node().is_some_and(|node| named.contains(&node.get()))
             }
-            id => match (id.sdo_request_node().map(NodeId::get), frame.all_eight()) {
+            id => match (id.sdo_request_node().map(NodeId::get), frame.as_eight_bytes()) {
                 (Some(node), Some(data)) => {
                     let reads = matches!(data[0] >> 5, 2..=5);
                     let meant = named.contains(&node);

@@ -123,7 +123,7 @@ pub(super) fn answers(run: &Run) -> BTreeMap<(u8, ObjectId), BTreeSet<Vec<u8>>> 
     let mut all: BTreeMap<_, BTreeSet<Vec<u8>>> = BTreeMap::new();
     for station in run.bus.bus.inner().inner().stations::<FaultyDevice>() {
         for (_, frame) in &station.sent {
-            let (Some(node), Some(data)) = (frame.id().sdo_response_node(), frame.all_eight()) else { continue };
+            let (Some(node), Some(data)) = (frame.id().sdo_response_node(), frame.as_eight_bytes()) else { continue };
             if data[0] & 0x02 == 0 || data[0] >> 5 == 4 {
                 continue;
             }
@@ -140,7 +140,7 @@ pub(super) fn answers(run: &Run) -> BTreeMap<(u8, ObjectId), BTreeSet<Vec<u8>>> 
 pub(super) fn signatures(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     let mut sent: BTreeMap<(u8, [u8; 8]), u32> = BTreeMap::new();
     for (_, frame) in run.bus.all_sent() {
-        if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight())
+        if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.as_eight_bytes())
             && data[0] >> 5 == 1
             && is_signature(&data[4..8])
         {

@@ -36,15 +36,16 @@ pub(super) fn check_cause(spec: &Spec, run: &Run, violations: &mut Vec<Violation
 /// The first of these frames that changed a device, or may have.
 fn taken(frames: &[(Mono, Passed)]) -> Option<(Mono, Frame)> {
     let (&(at, Passed::Sent(request)), rest) = frames.split_first()? else { return None };
-    let refuses = |answer: &Frame| match (request.id().sdo_request_node(), request.all_eight(), answer.all_eight()) {
-        (Some(node), Some(request), Some(answered)) => {
-            answer.id() == CanId::sdo_response(node) && answered[0] == 0x80 && answered[1..4] == request[1..4]
-        }
-        (None, Some(request), Some(answered)) => {
-            answer.id() == CanId::LSS_SLAVE && answered[0] == request[0] && answered[1] != 0
-        }
-        _ => false,
-    };
+    let refuses =
+        |answer: &Frame| match (request.id().sdo_request_node(), request.as_eight_bytes(), answer.as_eight_bytes()) {
+            (Some(node), Some(request), Some(answered)) => {
+                answer.id() == CanId::sdo_response(node) && answered[0] == 0x80 && answered[1..4] == request[1..4]
+            }
+            (None, Some(request), Some(answered)) => {
+                answer.id() == CanId::LSS_SLAVE && answered[0] == request[0] && answered[1] != 0
+            }
+            _ => false,
+        };
     let refused = rest.iter().any(|(_, passed)| matches!(passed, Passed::Received(answer) if refuses(answer)));
     (changes(&request) && !refused).then_some((at, request))
 }
@@ -60,7 +61,7 @@ fn changes(frame: &Frame) -> bool {
 
 /// The object of a request that begins a transfer.
 fn begins(frame: &Frame) -> Option<ObjectId> {
-    let data = frame.all_eight()?;
+    let data = frame.as_eight_bytes()?;
     let begins = match data[0] >> 5 {
         1 | 2 => true,
         5 => data[0] & 0x03 == 0,
@@ -108,7 +109,7 @@ fn was_silent(spec: &Spec, run: &Run, failure: &Failure, violations: &mut Vec<Vi
 
 /// Whether a frame answers a request that begins a transfer of an object.
 fn answers(frame: &Frame, node: NodeId, object: ObjectId) -> bool {
-    let addressed = frame.all_eight().map(|data| ObjectId::from_multiplexer([data[1], data[2], data[3]]));
+    let addressed = frame.as_eight_bytes().map(|data| ObjectId::from_multiplexer([data[1], data[2], data[3]]));
     let is_answer = frame.data().first().is_some_and(|first| matches!(first >> 5, 2..=6));
     frame.id() == CanId::sdo_response(node) && addressed == Some(object) && is_answer
 }

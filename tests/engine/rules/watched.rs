@@ -1,7 +1,7 @@
 //! `nmt watch` reports exactly the changes that were received.
 
 use super::*;
-use cangauge::canopen::nmt::Life;
+use cangauge::canopen::nmt::ErrorControlMessage;
 use cangauge::tasks::nmt::Change;
 use std::time::Duration;
 
@@ -9,19 +9,21 @@ use std::time::Duration;
 pub(super) fn watched(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     let Command::NmtWatch { nodes, .. } = &spec.command else { return };
     let received = run.bus.frames.iter().filter_map(|(at, passed)| match passed {
-        Passed::Received(frame) => Life::parse(frame).map(|(node, life)| (*at, node, life)),
+        Passed::Received(frame) => ErrorControlMessage::parse(frame).map(|(node, life)| (*at, node, life)),
         Passed::Sent(_) => None,
     });
-    let lives: Vec<(Mono, NodeId, Life)> = received.filter(|(_, node, _)| nodes.contains(&node.get())).collect();
+    let lives: Vec<(Mono, NodeId, ErrorControlMessage)> =
+        received.filter(|(_, node, _)| nodes.contains(&node.get())).collect();
     let mut left = lives.clone();
     for seen in &run.observed.seen {
         let at = seen.at.mono;
         let life = match seen.change {
-            Change::BootUp => Life::BootUp,
-            Change::State(state) | Change::Back(state) => Life::State(state),
+            Change::BootUp => ErrorControlMessage::BootUp,
+            Change::State(state) | Change::Back(state) => ErrorControlMessage::State(state),
             Change::Lost(silent) => {
-                let is_silent =
-                    |(came, node, _): &(Mono, NodeId, Life)| *node == seen.node && *came > at - silent && *came <= at;
+                let is_silent = |(came, node, _): &(Mono, NodeId, ErrorControlMessage)| {
+                    *node == seen.node && *came > at - silent && *came <= at
+                };
                 if silent < Duration::from_millis(50) || lives.iter().any(is_silent) {
                     violations.push(("reports received changes", format!("{seen:?} of {lives:?}")));
                 }
@@ -39,11 +41,11 @@ pub(super) fn watched(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     let mut before: BTreeMap<NodeId, NmtState> = BTreeMap::new();
     for (at, node, life) in lives.iter().filter(|(at, ..)| *at > run.started) {
         let is_news = match life {
-            Life::BootUp => {
+            ErrorControlMessage::BootUp => {
                 before.remove(node);
                 true
             }
-            Life::State(state) => before.insert(*node, *state).is_some_and(|before| before != *state),
+            ErrorControlMessage::State(state) => before.insert(*node, *state).is_some_and(|before| before != *state),
         };
         let is_told = run.observed.seen.iter().any(|seen| seen.node == *node && seen.at.mono == *at);
         if is_news && !is_told {

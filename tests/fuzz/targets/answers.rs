@@ -31,7 +31,7 @@ impl Station for Answerer {
     fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
         // There is no other participant: all received frames are from the program.
         assert_eq!(frame.id(), CanId::sdo_request(node()), "{frame} is not for this node");
-        let request = frame.all_eight().expect("eight bytes");
+        let request = frame.as_eight_bytes().expect("eight bytes");
         assert!(matches!(request[0] >> 5, 2 | 3 | 4 | 5), "{frame} is no part of a read");
         let mut bytes = Bytes(self.script.get(self.at..).unwrap_or_default());
         let before = bytes.0.len();

@@ -4,7 +4,7 @@
 use cangauge::canopen::emcy::Emergency;
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::CanId;
-use cangauge::canopen::nmt::{Life, NmtCommand};
+use cangauge::canopen::nmt::{ErrorControlMessage, NmtCommand};
 use cangauge::canopen::wire_length::frame_bits;
 use cangauge_fuzz::Bytes;
 use libfuzzer_sys::fuzz_target;
@@ -27,7 +27,7 @@ fuzz_target!(|data: &[u8]| {
         if let Some((command, node)) = NmtCommand::parse(&frame) {
             assert_eq!(NmtCommand::parse(&command.frame(node)), Some((command, node)));
         }
-        if let Some((node, _)) = Life::parse(&frame) {
+        if let Some((node, _)) = ErrorControlMessage::parse(&frame) {
             // An emergency without data is the boot-up message of devices before CiA 301 version 4.
             let is_old_boot_up = frame.id() == CanId::emergency(node) && frame.data().is_empty();
             assert!(frame.id() == CanId::heartbeat(node) || is_old_boot_up);

@@ -5,7 +5,7 @@ use cangauge::bus::Received;
 use cangauge::bus::time::{Mono, Stamp, Wall};
 use cangauge::canopen::id::CanId;
 use cangauge::canopen::object::ObjectId;
-use cangauge::canopen::pdo::{CobId, MappingEntry, TpdoNumber, lay_out};
+use cangauge::canopen::pdo::{CobId, MappingEntry, TpdoNumber, field_layout};
 use cangauge::canopen::value::DataType;
 use cangauge::device::unit::Unit;
 use cangauge::measure::decode::{Decoded, Decoder};
@@ -35,7 +35,7 @@ fuzz_target!(|data: &[u8]| {
         range: cangauge::measure::layout::MeasuringRange::Unknown,
     });
     let mapping: Vec<MappingEntry> = (0..head >> 4).map(|_| MappingEntry::from_word(bytes.long())).collect();
-    let bits: usize = lay_out(&mapping).iter().map(|field| usize::from(field.entry.bits)).sum();
+    let bits: usize = field_layout(&mapping).iter().map(|field| usize::from(field.entry.bits)).sum();
     let number = TpdoNumber::new(1).expect("1 to 512");
     let mapped = mapping.len();
     device.tpdos.push(Tpdo { number, cob_id: CobId(TPDO), transmission: None, event_timer_ms: None, mapping });

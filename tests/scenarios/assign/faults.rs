@@ -86,7 +86,7 @@ fn rejected_store_is_reverted_and_no_success() {
     let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
     master.send("000#8105".parse().unwrap());
     let until = master.now() + std::time::Duration::from_millis(500);
-    while !matches!(master.next(until), Ok(cangauge::master::Happening::Deadline)) {}
+    while !matches!(master.next(until), Ok(cangauge::master::MasterEvent::Deadline)) {}
     drop(master);
     assert_eq!(all_snapshots(&bus), before);
     // The device's objects work.

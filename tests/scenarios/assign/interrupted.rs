@@ -89,7 +89,7 @@ fn at_every_step(bench: &str, target: &str, wanted: &Wanted) {
                     let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
                     master.send("000#8105".parse().unwrap());
                     let until = master.now() + Duration::from_millis(500);
-                    while !matches!(master.next(until), Ok(cangauge::master::Happening::Deadline)) {}
+                    while !matches!(master.next(until), Ok(cangauge::master::MasterEvent::Deadline)) {}
                     drop(master);
                     assert_eq!(all_snapshots(&bus)[0], before[0], "{moment:?}: {failure}");
                 }

@@ -91,7 +91,7 @@ impl Deviant {
     fn note(&mut self, frame: &Frame) {
         let memory = &mut self.memory;
         if frame.id().number() == 0x600 + u32::from(NODE)
-            && let Some(request) = frame.all_eight()
+            && let Some(request) = frame.as_eight_bytes()
         {
             memory.last = memory.request.replace(request);
             if let [0x22..=0x2f, a, b, c, value @ ..] = request {
@@ -108,7 +108,7 @@ impl Deviant {
                 _ => {}
             }
         }
-        if let (CanId::LSS_MASTER, Some(request)) = (frame.id(), frame.all_eight()) {
+        if let (CanId::LSS_MASTER, Some(request)) = (frame.id(), frame.as_eight_bytes()) {
             memory.lss = request;
             match request {
                 [0x04, mode, ..] => memory.is_configuring = mode == 1,
@@ -147,7 +147,7 @@ impl Station for Deviant {
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
         let mut frame = *frame;
         self.note(&frame);
-        let request = frame.all_eight().filter(|_| frame.id().number() == 0x600 + u32::from(NODE));
+        let request = frame.as_eight_bytes().filter(|_| frame.id().number() == 0x600 + u32::from(NODE));
         match (self.deviation, request) {
             (Some(Deviation::Answers(answer)), Some(request)) => {
                 if let Some(answer) = answer(&mut self.memory, request) {
@@ -164,7 +164,7 @@ impl Station for Deviant {
         self.device.receive(now, &frame, &mut inner);
         self.send(now, &mut inner, out);
         if let (Some(Deviation::Lss(answer)), CanId::LSS_MASTER, Some(request)) =
-            (self.deviation, frame.id(), frame.all_eight())
+            (self.deviation, frame.id(), frame.as_eight_bytes())
             && let Some(answer) = answer(&mut self.memory, request)
         {
             out.send(Frame::full(CanId::LSS_SLAVE, answer));

@@ -144,7 +144,7 @@ pub(super) const SDO: &[Row] = &[
         Ignores(|memory, _, frame| {
             if !is_answer(frame) && frame.data().starts_with(READ_TYPE) {
                 memory.count += 1;
-            } else if frame.all_eight().is_some() {
+            } else if frame.as_eight_bytes().is_some() {
                 memory.count = 0;
             }
             memory.count == 40
@@ -229,7 +229,7 @@ pub(super) const OD: &[Row] = &[
         "mc1609",
         "OD-04",
         Both(
-            |_, frame| match frame.all_eight() {
+            |_, frame| match frame.as_eight_bytes() {
                 // The device shows the same vendor-ID by LSS.
                 Some([service @ (0x40 | 0x46), 0, 0, 0, 0, ..]) => {
                     Frame::full(frame.id(), [service, 0x1d, 0x01, 0, 0, 0, 0, 0])

@@ -155,7 +155,7 @@ fn three_slaves_are_found_without_changing_them() {
         let mut master = Master::new(&mut bus, Timing::default());
         let mut lss = master.lss();
         let mut found: Vec<LssAddress> = Vec::new();
-        while let Some(address) = lss.fastscan_beside(&found, None).unwrap() {
+        while let Some(address) = lss.fastscan_excluding(&found, None).unwrap() {
             assert!(!found.contains(&address), "{address} twice");
             found.push(address);
         }

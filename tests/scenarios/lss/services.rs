@@ -8,7 +8,7 @@ use cangauge::bus::{Bus, BusError, Event, Fault, Mono, Received};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::lss::{ErrorCode, LssRange, Mode, Part, Service, Violation};
-use cangauge::master::lss::{Gathered, Others};
+use cangauge::master::lss::{GatheredAnswers, Others};
 use cangauge::master::{Error, Lss, LssError, Master, Timing};
 use cangauge::node::Overrides;
 use cangauge::tasks::Note;
@@ -282,7 +282,7 @@ impl cangauge::bus::BitRateControl for OddBus {
 }
 
 impl Bus for OddBus {
-    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
+    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer unreported_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         self.bus.send(frame)
@@ -309,7 +309,9 @@ fn colliding_answers_are_not_silence() {
     let mut lss = master.lss();
     lss.switch_global(Mode::Configuration).unwrap();
     let serial = lss.inquire(Part::Serial).unwrap();
-    assert!(matches!(&serial, Gathered { answers, faults, .. } if answers.is_empty() && faults[0] == Fault::Protocol));
+    assert!(
+        matches!(&serial, GatheredAnswers { answers, faults, .. } if answers.is_empty() && faults[0] == Fault::Protocol)
+    );
     assert!(!serial.is_one());
 }
 
@@ -362,7 +364,8 @@ fn short_inquiry_answer_is_a_violation() {
 
 #[test]
 fn answer_with_a_bus_error_may_be_several() {
-    let gathered = |faults: &[Fault]| Gathered { answers: vec![1], has_several_slaves: false, faults: faults.to_vec() };
+    let gathered =
+        |faults: &[Fault]| GatheredAnswers { answers: vec![1], has_several_slaves: false, faults: faults.to_vec() };
     assert!(gathered(&[]).is_one() && gathered(&[Fault::NoAcknowledge]).is_one());
     for fault in [Fault::Protocol, Fault::ErrorWarning, Fault::ErrorPassive, Fault::BusOff, Fault::Other] {
         assert!(!gathered(&[fault]).is_one(), "{fault:?}");

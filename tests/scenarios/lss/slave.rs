@@ -162,7 +162,7 @@ impl Station for Slave {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
-        let (true, Some(data)) = (frame.id() == CanId::LSS_MASTER, frame.all_eight()) else { return };
+        let (true, Some(data)) = (frame.id() == CanId::LSS_MASTER, frame.as_eight_bytes()) else { return };
         let is_busy = self.drops_while_busy && !self.waiting.is_empty();
         if is_busy || self.received_at.is_some_and(|at| now.since(at) < self.pause) {
             return;

@@ -207,7 +207,7 @@ fn simultaneous_frames_merge_if_equal_and_collide_if_not() {
 
 #[test]
 fn setting_the_bit_rate_can_be_forbidden() {
-    let mut bus = MemoryBus::new(Clock::Virtual).with_retiming(false);
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate_changes(false);
     assert!(matches!(bus.can_set_bit_rate(), Err(BusError::Permission(_))));
     assert!(matches!(bus.set_bit_rate(125_000, Mode::Normal), Err(BusError::Permission(_))));
     assert_eq!(bus.bit_rate(), Some(BIT_RATE));

@@ -158,7 +158,9 @@ impl Series<'_> {
         let text = match self.set(master, found, row)? {
             Ok(outcome) => {
                 let (node, sentence) = match &outcome {
-                    Outcome::Applied(applied) => (applied.after.node.id, AppliedReport((**applied).clone()).sentence()),
+                    Outcome::ApplyReport(applied) => {
+                        (applied.after.node.id, AppliedReport((**applied).clone()).sentence())
+                    }
                     Outcome::Lines(..) => return Ok(Ok(())),
                 };
                 self.done.push(outcome);

@@ -72,7 +72,7 @@ fn wrong_signature(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 }
 
 /// An autozero that was executed.
-struct Zeroed {
+struct AutozeroReport {
     objects: Objects,
     before: Readings,
     after: Readings,
@@ -82,7 +82,7 @@ struct Zeroed {
 }
 
 /// Writes the signature. The verdict if nothing can be judged.
-fn autozero(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Result<Zeroed, Verdict>, Error> {
+fn autozero(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Result<AutozeroReport, Verdict>, Error> {
     let objects = match objects(session, channel)? {
         Ok(objects) => objects,
         Err(verdict) => return Ok(Err(verdict)),
@@ -114,7 +114,7 @@ fn autozero(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Result<Z
     if shift.abs() <= 2.0 * tolerance {
         return Ok(Err(Verdict::not_judged(WhyNot::NearZero(value))));
     }
-    Ok(Ok(Zeroed { objects, before, after, offset_before, offset_after, tolerance }))
+    Ok(Ok(AutozeroReport { objects, before, after, offset_before, offset_after, tolerance }))
 }
 
 fn zero(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
@@ -136,7 +136,7 @@ fn offset(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
             Ok(zeroed) => zeroed,
             Err(verdict) => return Ok(verdict),
         };
-        let Zeroed { objects, before, after, offset_before, offset_after, tolerance } = zeroed;
+        let AutozeroReport { objects, before, after, offset_before, offset_after, tolerance } = zeroed;
         let value = offset_before + after.middle() - before.middle();
         let expected = Expected::Measured { value, tolerance };
         let finding = || Finding::at(objects.offset, expected, Seen::Measured(offset_after));

@@ -6,7 +6,7 @@ use crate::bus::{Fault, Filters, Mono, Received, Stamp};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
-use crate::canopen::nmt::{Life, NmtCommand, NmtState};
+use crate::canopen::nmt::{ErrorControlMessage, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::master::{Answer, Error, Master, Operation, SdoError, SdoFailure, SecondAnswer, Ticket};
 use crate::node::Node;
@@ -73,12 +73,12 @@ impl Recording<'_> {
         let (frame, at) = (&received.frame, received.at);
         if let Some((node, emergency)) = self.emergencies.parse(frame) {
             self.on_emergency(node, emergency, at, observer);
-        } else if let Some((node, life)) = Life::parse(frame) {
-            if let Some((node, length)) = Life::unusual_length(frame) {
+        } else if let Some((node, life)) = ErrorControlMessage::parse(frame) {
+            if let Some((node, length)) = ErrorControlMessage::unusual_length(frame) {
                 self.wrong_heartbeat_length(node, length, at, observer);
             }
             self.on_life(node, life, at, master, observer);
-        } else if let Some((node, length)) = Life::unusual_length(frame) {
+        } else if let Some((node, length)) = ErrorControlMessage::unusual_length(frame) {
             self.wrong_heartbeat_length(node, length, at, observer);
         } else if let Some(node) = node_with_written_setup(frame, &self.nodes) {
             self.request_reread(node, RereadReason::Written, at.mono, master);
@@ -159,8 +159,15 @@ impl Recording<'_> {
     }
 
     /// Handles a heartbeat or boot-up message.
-    fn on_life(&mut self, node: NodeId, life: Life, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
-        let is_boot_up = life == Life::BootUp;
+    fn on_life(
+        &mut self,
+        node: NodeId,
+        life: ErrorControlMessage,
+        at: Stamp,
+        master: &mut Master<'_>,
+        observer: &mut dyn Observer,
+    ) {
+        let is_boot_up = life == ErrorControlMessage::BootUp;
         if is_boot_up {
             self.decoder.end_overload(node);
         }
@@ -175,8 +182,8 @@ impl Recording<'_> {
         (observed.booted, observed.heartbeat_stopped) = (is_boot_up, false);
         observed.commanded = observed.commanded.filter(|_| !is_boot_up);
         observed.state = match life {
-            Life::State(state) => Some(state),
-            Life::BootUp => None,
+            ErrorControlMessage::State(state) => Some(state),
+            ErrorControlMessage::BootUp => None,
         };
         observed.was_operational |= observed.state == Some(NmtState::Operational);
         if !self.liveness.has(node) {

@@ -3,7 +3,7 @@
 use super::super::heartbeats::{HeartbeatChange, HeartbeatMonitor};
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::Life;
+use crate::canopen::nmt::ErrorControlMessage;
 use crate::canopen::pdo::Transmission;
 use crate::measure::interval::IntervalTracker;
 use crate::measure::layout::Tpdo;
@@ -66,7 +66,7 @@ impl Liveness {
     }
 
     /// Handles a heartbeat or boot-up message.
-    pub(super) fn on_life(&mut self, node: NodeId, life: Life, at: Mono) -> HeartbeatChange {
+    pub(super) fn on_life(&mut self, node: NodeId, life: ErrorControlMessage, at: Mono) -> HeartbeatChange {
         self.heartbeats.on_life(node, life, at)
     }
 
@@ -158,7 +158,7 @@ mod tests {
         liveness.on_samples(id, at(100));
         liveness.on_samples(id, at(200));
         for second in 1..10 {
-            liveness.on_life(id, Life::State(state), at(second * 1000));
+            liveness.on_life(id, ErrorControlMessage::State(state), at(second * 1000));
         }
         while liveness.next_lost_heartbeat(at(end)).is_some() {}
         !liveness.lost(at(end)).is_empty()

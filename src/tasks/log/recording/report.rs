@@ -64,7 +64,7 @@ impl Recording<'_> {
         self.remarks.extend(self.rereads.paused().map(Remark::NotReadAgain));
         self.remarks.extend(self.not_operational());
         if self.tally.rows > 0 {
-            let unknown = self.listener.iter().flat_map(|listener| &listener.not_understood);
+            let unknown = self.listener.iter().flat_map(|listener| &listener.unknown_mappings);
             self.remarks.extend(unknown.map(|(&id, &node)| Remark::UnknownMapping(node, id)));
             let requests = matches!(self.options.mode, Mode::Request(_));
             self.remarks.extend(requests.then_some(Remark::FreshnessNotProven));

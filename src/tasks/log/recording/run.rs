@@ -4,7 +4,7 @@ use super::Recording;
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
-use crate::master::{Error, Happening, Master};
+use crate::master::{Error, Master, MasterEvent};
 use crate::node::wait::{self, Policy, Until, Waiter};
 use crate::tasks::log::producer::Producer;
 use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, LogEvent, Mode, Observer, TICK_INTERVAL};
@@ -99,10 +99,10 @@ impl Recording<'_> {
                 self.tally.events.missing = std::mem::take(&mut self.due).missing(self.tally.end(), interval);
             }
         }
-        let late_drops = master.late_drops();
-        if late_drops > 0 {
-            self.tally.dropped += u64::from(late_drops);
-            observer.event(&LogEvent::Dropped(late_drops), master.bus().now());
+        let unreported_drops = master.unreported_drops();
+        if unreported_drops > 0 {
+            self.tally.dropped += u64::from(unreported_drops);
+            observer.event(&LogEvent::Dropped(unreported_drops), master.bus().now());
         }
         self.report_repeated(master.bus().now(), true, observer);
         result
@@ -232,25 +232,25 @@ impl Waiter for Loop<'_, '_> {
         }
     }
 
-    fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Error> {
+    fn on_event(&mut self, master: &mut Master<'_>, event: MasterEvent) -> Result<ControlFlow<()>, Error> {
         if let Some(producer) = &mut self.producer {
             producer.check_sent(master);
             self.recording.tally.syncs.sent = producer.sent();
         }
         let Loop { recording, schedule, producer, observer } = self;
         match event {
-            Happening::Frame(received) => return Ok(recording.on_frame(&received, master, *observer)),
-            Happening::Sdo(ticket, result) => return recording.on_answer(ticket, result, master, *observer),
-            Happening::Deadline => {
+            MasterEvent::Frame(received) => return Ok(recording.on_frame(&received, master, *observer)),
+            MasterEvent::Sdo(ticket, result) => return recording.on_answer(ticket, result, master, *observer),
+            MasterEvent::Deadline => {
                 // Nothing has changed since `until` returned this moment.
                 let now = recording.next_deadline(schedule, producer.as_deref());
                 return Ok(recording.on_deadline(now, schedule, producer.as_deref_mut(), master, *observer));
             }
-            Happening::Interrupted => return recording.on_interrupt(schedule, master),
-            Happening::Ended => return Ok(ControlFlow::Break(())),
-            Happening::Fault(fault, at) => recording.on_fault(fault, at, master, *observer),
-            Happening::Dropped(count) => recording.on_dropped(count, master, *observer),
-            Happening::Link(up) => recording.on_link(up, master, *observer),
+            MasterEvent::Interrupted => return recording.on_interrupt(schedule, master),
+            MasterEvent::Ended => return Ok(ControlFlow::Break(())),
+            MasterEvent::Fault(fault, at) => recording.on_fault(fault, at, master, *observer),
+            MasterEvent::Dropped(count) => recording.on_dropped(count, master, *observer),
+            MasterEvent::Link(up) => recording.on_link(up, master, *observer),
         }
         Ok(ControlFlow::Continue(()))
     }
