@@ -19,8 +19,9 @@ const FOREIGN_ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 /// The longest wait for a second answer.
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
-/// The largest number of earlier answers that are stored, to recognise repeated answers.
-const MAX_HISTORY: usize = 16;
+/// The largest number of earlier answers that are stored, to recognise repeated answers. A slow device answers while a
+/// fast one with the same node-ID has already answered many later requests, for example all requests of a set-up.
+const MAX_HISTORY: usize = 128;
 
 /// The reaction if two devices answer with one node-ID.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -286,6 +287,15 @@ mod tests {
             log.on_unexpected(&frame(second), ms(21));
             assert_eq!(log.differing().is_some(), expected, "{second}");
         }
+    }
+
+    #[test]
+    fn a_second_answer_after_the_reads_of_a_set_up_shows_two_devices() {
+        let later: Vec<String> = (0..100).map(|sub| format!("585#43001A{sub:02X}20010161")).collect();
+        let answers: Vec<_> = std::iter::once(SERIAL).chain(later.iter().map(String::as_str)).collect();
+        let mut log = after(&answers.into_iter().map(|answer| (answer, Operation::Read)).collect::<Vec<_>>());
+        assert!(log.on_unexpected(&frame(OTHER_SERIAL), ms(2000)));
+        assert!(log.differing().is_some());
     }
 
     #[test]
