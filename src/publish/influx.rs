@@ -101,8 +101,8 @@ impl Influx {
 }
 
 impl Sink for Influx {
-    /// The recording has microseconds. The last three digits of the time are those of the line number, so that two rows
-    /// with the same microsecond remain two points, and a repeated row remains one.
+    /// The recording has microseconds. The last three digits of the line number are added as nanoseconds, so that two
+    /// rows with the same microsecond remain two points, and a repeated row remains one.
     fn encode(&mut self, record: &Record<'_>, out: &mut Vec<u8>) {
         let row = record.row;
         let line = Line {

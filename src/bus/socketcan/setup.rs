@@ -143,7 +143,7 @@ pub(super) fn restore(name: &str, before: &Link, while_down: &mut dyn FnMut()) -
     if differs && let Some(timing) = timing {
         let set = |timing| netlink::configure(&now, timing, before.listen_only);
         // Time quanta give exactly the same bit timing. If the driver rejects them, the bit rate is used.
-        set(timing.again())
+        set(timing.to_request())
             .or_else(|_| set(BitTiming::of_rate(timing.bit_rate)))
             .map_err(|refusal| refusal.into_error(&format!("restore {name} to {} bit/s", timing.bit_rate), name))?;
     }

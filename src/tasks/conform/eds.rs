@@ -60,11 +60,11 @@ pub(super) const CASES: &[Case] = &[
         ACCESS,
         objects::read_only,
     )
-    .matters(Medium, "A wrong write changes the device, or its reason is not shown."),
+    .matters(Medium, "A wrong write changes the device, or the abort code does not show the reason."),
     case("EDS-14", "Objects that the file calls wo reject a read", ACCESS, objects::write_only)
         .matters(Low, "The reason of a failed read is not shown."),
     case("EDS-15", "Objects that the file calls rw are not read-only", ACCESS, objects::writable)
-        .matters(High, "Masters that set the device up fail."),
+        .matters(High, "Masters cannot configure the device."),
     case("EDS-16", "An integer above its HighLimit is rejected, and changes nothing", LIMITS, limits::too_high)
         .matters(Medium, "A setting that the device does not support is not noticed."),
     case("EDS-17", "An integer below its LowLimit is rejected, and changes nothing", LIMITS, limits::too_low)
@@ -75,7 +75,7 @@ pub(super) const CASES: &[Case] = &[
         "CiA 306, DefaultValue",
         values::restored,
     )
-    .matters(Medium, "Masters that write only differences from the defaults set the device up wrongly.")
+    .matters(Medium, "Masters that write only the differences from the defaults configure the device wrongly.")
     .stores(),
     case("EDS-19", "Objects that the file calls mappable can be mapped to a TPDO", MAPPING, mapping::mappable)
         .matters(High, "Masters that map the object fail."),

@@ -24,7 +24,7 @@ pub(super) const CASES: &[Case] = &[
         .matters(Medium, "Masters assign the answer to the wrong service."),
     case("LSS-02", "The inquired address is that of 1018h", INQUIRE, address)
         .matters(High, "The device cannot be addressed by the numbers that tools show."),
-    case("LSS-03", "The inquired node-ID is the node-ID", INQUIRE, node_id)
+    case("LSS-03", "The inquired node-ID is the present node-ID", INQUIRE, node_id)
         .matters(Medium, "Tools show a wrong node-ID."),
     case("LSS-04", "Inquiries are not answered in waiting state", INQUIRE, waiting)
         .matters(High, "Answers of several devices collide."),
@@ -296,7 +296,7 @@ fn form(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     Ok(if is_any { Verdict::Pass } else { Verdict::NotApplicable(WhyNot::NoService(0x5a)) })
 }
 
-/// Switches the device to configuration state by its address.
+/// Switches the device to configuration state (switch state global). `false` if it has no LSS.
 fn configure(session: &mut Session<'_, '_>) -> Result<bool, Error> {
     if !prepare(session)? {
         return Ok(false);
@@ -327,15 +327,15 @@ fn bad_node_id(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
         let answer = session.lss(&[0x11, id])?;
         let verdict = expect_code(answer, 0x11, false);
         if !matches!(verdict, Verdict::Pass) {
-            own_node_id_again(session)?;
+            restore_node_id(session)?;
             return Ok(verdict);
         }
     }
     Ok(Verdict::Pass)
 }
 
-/// The node-ID before a reset is the present one.
-fn own_node_id_again(session: &mut Session<'_, '_>) -> Result<(), Error> {
+/// Configures the present node-ID again, because a reset would make the configured one active.
+fn restore_node_id(session: &mut Session<'_, '_>) -> Result<(), Error> {
     let own = session.node.id.get();
     session.lss(&[0x11, own]).map(drop)
 }

@@ -33,7 +33,7 @@ pub(super) const CASES: &[Case] = &[
     case("SDO-02", "Answers have eight bytes", "CiA 301, SDO protocols", eight_bytes)
         .matters(Medium, "Masters that check the length ignore the answers."),
     case("SDO-03", "A write to the read-only object 1000h is rejected", ABORT, write_read_only)
-        .matters(Medium, "A wrong write is not noticed, or its reason is not shown."),
+        .matters(Medium, "A wrong write is not noticed, or the abort code does not show the reason."),
     case("SDO-04", "A read of a write-only object is rejected", ABORT, read_write_only)
         .matters(Low, "The reason of a failed read is not shown."),
     case("SDO-05", "A read of a missing sub-index is rejected", ABORT, missing_sub_index)

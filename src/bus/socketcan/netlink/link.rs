@@ -100,7 +100,7 @@ impl BitTiming {
     }
 
     /// Returns this bit timing as a request. The kernel accepts either a bit rate or time quanta.
-    pub(in super::super) fn again(self) -> BitTiming {
+    pub(in super::super) fn to_request(self) -> BitTiming {
         if self.quantum == 0 { BitTiming::of_rate(self.bit_rate) } else { BitTiming { bit_rate: 0, ..self } }
     }
 

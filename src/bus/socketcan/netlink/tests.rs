@@ -57,8 +57,12 @@ fn a_listen_only_controller_is_parsed() {
     let timing = BitTiming { bit_rate: 250_000, sample_point: 875, quantum: 250, segments: [6, 7, 2, 1] };
     assert_eq!(link.bit_timing, Some(timing));
     assert_eq!((link.state, link.listen_only, link.restart_ms), (Some(State::ErrorActive), Some(true), Some(100)));
-    assert_eq!(timing.again(), BitTiming { bit_rate: 0, ..timing }, "the kernel takes one or the other");
-    assert_eq!(BitTiming::of_rate(125_000).again(), BitTiming::of_rate(125_000));
+    assert_eq!(
+        timing.to_request(),
+        BitTiming { bit_rate: 0, ..timing },
+        "the kernel accepts either a bit rate or time quanta"
+    );
+    assert_eq!(BitTiming::of_rate(125_000).to_request(), BitTiming::of_rate(125_000));
 }
 
 #[test]
