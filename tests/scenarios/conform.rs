@@ -228,28 +228,111 @@ fn other_nodes_are_a_reason_to_refuse() {
 fn an_interrupted_check_restores_the_device() {
     for area in Area::ALL {
         for kind in ["mh4", "d20", "mc1609", "dps"] {
-            let file = (area == Area::Eds).then(|| eds(kind, &[]));
-            let options =
-                ConformOptions { only: Some(area), store: file.is_some(), eds: file, ..ConformOptions::default() };
-            let mut clean = FaultyBus::new(bus(kind, None), Fault::None, 0);
-            let before = contents(&mut clean.bus);
-            run(&mut clean, kind, &options).expect("a report");
-            let count = clean.sent.len();
-            // The first frames search the bus for other nodes.
             let step = if kind == "mh4" { 9 } else { 83 };
-            for at in (260..count).step_by(step.max(count / 60)) {
-                let case = format!("{kind} {area} interrupted at {at} of {count}: {}", clean.sent[at]);
-                let mut faulty = FaultyBus::new(bus(kind, None), Fault::Interrupt, at);
-                let result = run(&mut faulty, kind, &options);
-                let mut bus = faulty.bus;
-                let until = Mono::at(bus.mono().since_start() + Duration::from_secs(2));
-                while bus.receive(until).expect("the bus works") != Event::Timeout {}
-                match result {
-                    Ok(report) => assert_eq!(report.not_restored, [], "{case}"),
-                    Err(failure) => assert_eq!(failure.kind(), Kind::Interrupted, "{case}: {failure}"),
-                }
-                assert_eq!(differences(&mut bus, &before), [""; 0], "{case}");
-            }
+            let wrong = interrupted(kind, area, area == Area::Eds, |count| step.max(count / 60));
+            assert_eq!(wrong, [""; 0]);
         }
     }
+}
+
+#[test]
+fn late_answer_to_an_interrupted_write_leaves_no_setting_unrestored() {
+    assert_eq!(interrupted("dps", Area::Emcy, false, |_| 1), [""; 0]);
+}
+
+/// Ctrl-C after each frame. One test for each device, so that they run in parallel.
+mod every_frame {
+    use super::*;
+
+    fn all_areas(kind: &str, store: bool) {
+        let wrong: Vec<String> = Area::ALL.into_iter().flat_map(|area| interrupted(kind, area, store, |_| 1)).collect();
+        assert_eq!(wrong, [""; 0]);
+    }
+
+    #[test]
+    #[ignore = "takes minutes: .ci/long interrupts"]
+    fn mh4() {
+        all_areas("mh4", false);
+    }
+
+    #[test]
+    #[ignore = "takes minutes: .ci/long interrupts"]
+    fn mh4_with_store() {
+        all_areas("mh4", true);
+    }
+
+    #[test]
+    #[ignore = "takes minutes: .ci/long interrupts"]
+    fn d20() {
+        all_areas("d20", false);
+    }
+
+    #[test]
+    #[ignore = "takes minutes: .ci/long interrupts"]
+    fn d20_with_store() {
+        all_areas("d20", true);
+    }
+
+    #[test]
+    #[ignore = "takes minutes: .ci/long interrupts"]
+    fn mc1609() {
+        all_areas("mc1609", false);
+    }
+
+    #[test]
+    #[ignore = "takes minutes: .ci/long interrupts"]
+    fn mc1609_with_store() {
+        all_areas("mc1609", true);
+    }
+
+    #[test]
+    #[ignore = "takes minutes: .ci/long interrupts"]
+    fn dps() {
+        all_areas("dps", false);
+    }
+
+    #[test]
+    #[ignore = "takes minutes: .ci/long interrupts"]
+    fn dps_with_store() {
+        all_areas("dps", true);
+    }
+}
+
+/// The device works for two seconds.
+fn run_on(bus: &mut MemoryBus) {
+    let until = Mono::at(bus.mono().since_start() + Duration::from_secs(2));
+    while bus.receive(until).expect("the bus works") != Event::Timeout {}
+}
+
+/// The first frames search the bus for other nodes.
+const SEARCH: usize = 260;
+
+/// Interrupts the cases of an area after each `step`th frame. Returns what is not as before.
+fn interrupted(kind: &str, area: Area, store: bool, step: impl Fn(usize) -> usize) -> Vec<String> {
+    let file = (area == Area::Eds).then(|| eds(kind, &[]));
+    let options = ConformOptions { only: Some(area), store, eds: file, ..ConformOptions::default() };
+    let mut clean = FaultyBus::new(bus(kind, None), Fault::None, 0);
+    let before = contents(&mut clean.bus);
+    run(&mut clean, kind, &options).expect("a report");
+    let count = clean.sent.len();
+    let mut wrong = Vec::new();
+    for at in (SEARCH..count).step_by(step(count)) {
+        let mut faulty = FaultyBus::new(bus(kind, None), Fault::Interrupt, at);
+        let result = run(&mut faulty, kind, &options);
+        let mut bus = faulty.bus;
+        run_on(&mut bus);
+        let mut found = differences(&mut bus, &before);
+        bus.power_cycle();
+        run_on(&mut bus);
+        found.extend(differences(&mut bus, &before).into_iter().map(|one| format!("after a power cycle: {one}")));
+        match result {
+            Ok(report) => found.extend(report.not_restored.iter().map(|object| format!("not restored: {object}"))),
+            Err(failure) if failure.kind() == Kind::Interrupted && failure.effects.is_empty() => {}
+            Err(failure) => found.push(format!("{failure}: {:?}", failure.effects)),
+        }
+        if !found.is_empty() {
+            wrong.push(format!("{kind} {area}, store {store}, {at} of {count} ({}): {found:?}", clean.sent[at]));
+        }
+    }
+    wrong
 }

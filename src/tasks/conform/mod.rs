@@ -180,6 +180,7 @@ pub fn conform(
     session.read_settings(options.store)?;
     let started = session.master.bus().now();
     let run = session.begin().map_err(Failure::from).and_then(|()| session.run(options, observe));
+    session.is_answer_open |= run.is_err();
     let restored = session.restore();
     let state = session.restore_state();
     let length = session.master.now().since(started.mono);
@@ -243,6 +244,7 @@ impl Session<'_, '_> {
             };
             let transcript = self.master.take_transcript();
             let length = self.master.now().since(started);
+            self.is_answer_open |= verdict.is_err();
             let verdict = match verdict {
                 Err(error) if error.is_fatal() => return Err(error.into()),
                 Err(error) => Verdict::not_judged(WhyNot::Failed(Box::new(error.into()))),

@@ -52,7 +52,7 @@ pub(super) struct Session<'s, 'bus> {
     pub(super) needs_reset: bool,
     /// The sub-indices of 1010h whose stored settings the present case has changed.
     pub(super) stored: Vec<ObjectId>,
-    /// Whether the last raw request may still be answered.
+    /// Whether the last request may still be answered.
     pub(super) is_answer_open: bool,
     /// The object of a raw transfer that may be unfinished.
     pub(super) open_transfer: Option<ObjectId>,

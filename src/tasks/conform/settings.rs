@@ -171,6 +171,7 @@ impl Session<'_, '_> {
             if !matches!(result, Err(Error::Interrupted)) {
                 break;
             }
+            self.is_answer_open = true;
             result = self.restore_once();
         }
         result
