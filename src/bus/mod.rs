@@ -20,6 +20,7 @@ mod pcapng;
 #[cfg(unix)]
 mod poll;
 mod port;
+pub mod program;
 pub mod remote;
 pub mod replay;
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! `cangauge conform`.
 
+mod stimulus;
+
 use super::exit::FileError;
 use super::file::ReportFile;
 use super::journal::SettingsJournal;
@@ -8,12 +10,13 @@ use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::conform::{CaseRow, ConformRecord, ResultRow, SavedReport, left, summary};
 use crate::output::failure::ErrorMessage;
-use crate::tasks::conform::{Area, CaseResult, ConformFailure, ConformOptions, cases, conform};
+use crate::tasks::conform::{Area, CaseResult, ConformFailure, ConformOptions, Stimulus, cases, conform};
 use crate::tasks::{Failure, Kind, config};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use stimulus::StimulusCommand;
 
 /// Check a device against CiA 301, CiA 305, CiA 404 and its EDS
 ///
@@ -29,6 +32,9 @@ use std::sync::Arc;
 /// With --eds FILE, the EDS or DCF file is also checked against CiA 306 and compared with the device: existence, size,
 /// access, limits and mapping of each object, and with --store its defaults.
 ///
+/// With --stimulus CMD, the first channel that can show overloads is checked with a value outside of its measuring range.
+/// A failure of CMD, or no end within 60 s, is reported as not-judged. CMD is always run with "normal" at the end.
+///
 /// Some cases reset the device. Without --store, settings in 2000h to 5FFFh that were not stored are then lost. They are
 /// listed as "not restored" if the object dictionary of the device is known.
 ///
@@ -37,7 +43,7 @@ use std::sync::Arc;
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n  404            analogue inputs of CiA 404\n  eds            EDS file (--eds)\n  timing         timing profile: figures without a verdict\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform 5 --eds sensor.eds --report new.html\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
+    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n  404            analogue inputs of CiA 404\n  eds            EDS file (--eds)\n  timing         timing profile: figures without a verdict\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform 5 --eds sensor.eds --report new.html\n  cangauge conform 5 --only 404 --stimulus ./pressure.sh\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
 )]
 pub(crate) struct Conform {
     #[command(subcommand)]
@@ -54,6 +60,10 @@ pub(crate) struct Conform {
     /// Also run the cases that write to non-volatile memory, set the node-ID or execute autozero
     #[arg(long)]
     store: bool,
+    /// Run the cases of an overload. The shell command CMD sets the input of the device: it is run with the argument
+    /// overload-high, overload-low or normal, and ends when the input is set
+    #[arg(long, value_name = "CMD")]
+    stimulus: Option<String>,
     /// Write the verdicts as JUnit XML, for CI servers. An existing file is replaced
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
@@ -168,7 +178,9 @@ impl Conform {
                     printed = stream.push(&ResultRow { node, result: result.clone() });
                 }
             };
-            let report = conform(master, node, &overrides, &options, &mut journal, &mut observe)?;
+            let mut command = self.stimulus.as_deref().map(StimulusCommand::new).transpose()?;
+            let stimulus = command.as_mut().map(|command| command as &mut dyn Stimulus);
+            let report = conform(master, node, &overrides, &options, stimulus, &mut journal, &mut observe)?;
             let bus = (master.bus().name().to_owned(), master.bus().bit_rate(), master.bus().now().wall);
             Ok((report, bus, printed))
         })?;

@@ -8,6 +8,7 @@ pub use diff::{DiffRow, SavedReport};
 pub use record::ConformRecord;
 pub use words::finding;
 use words::page;
+pub(in crate::output) use words::stimulus_failure;
 
 use super::report::{Cell, Column, Report};
 use super::text;
@@ -142,12 +143,13 @@ pub fn summary(report: &ConformReport) -> String {
 
 /// What was not restored.
 pub fn left(report: &ConformReport) -> Option<String> {
-    let objects = super::failure::conform::list(&report.not_restored);
-    let state = "the NMT state from before is unknown: the node is pre-operational".to_owned();
-    match (report.not_restored.is_empty(), report.state) {
-        (true, StateAfter::Unchanged | StateAfter::Restored(_)) => None,
-        (true, StateAfter::Unknown) => Some(state),
-        (false, StateAfter::Unknown) => Some(format!("not restored: {objects}; {state}")),
-        (false, _) => Some(format!("not restored: {objects}")),
-    }
+    let objects = || format!("not restored: {}", super::failure::conform::list(&report.not_restored));
+    let state = || "the NMT state from before is unknown: the node is pre-operational".to_owned();
+    let left: Vec<String> = (!report.not_restored.is_empty())
+        .then(objects)
+        .into_iter()
+        .chain((report.state == StateAfter::Unknown).then(state))
+        .chain(report.input_failure.as_ref().map(super::failure::conform::input_left))
+        .collect();
+    (!left.is_empty()).then(|| left.join("; "))
 }

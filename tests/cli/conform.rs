@@ -141,3 +141,40 @@ fn reports_are_written_and_compared() {
     bench.run("conform diff missing.json missing.json").exit(8);
     bench.run("conform 1 --report r.txt").exit(2);
 }
+
+#[test]
+fn stimulus_is_run_for_each_input_and_for_the_normal_one_at_the_end() {
+    let bench = Bench::of("mh4@1");
+    let log = bench.path("inputs").display().to_string();
+    let run = |stimulus: &str| {
+        let arguments = ["conform", "1", "--only", "404", "--stimulus", stimulus];
+        bench.run_words(&arguments)
+    };
+    // The pressure of the simulated device does not change.
+    let done = run(&format!("echo noise; printf '%s\\n' >>{log}")).exit(0);
+    let moved = "404-70  not-judged      A positive overload sets bit 1 of the status (6150h), or the bits of 1001h in the \
+                 manual\n        0x6130:1 did not change enough\n";
+    assert!(done.stdout.contains(moved) && !done.stdout.contains("noise"), "{}", done.stdout);
+    let inputs = std::fs::read_to_string(&log).expect("the file");
+    let expected = ["high", "low", "high", "high"].map(|side| format!("overload-{side}\nnormal\n"));
+    assert_eq!(inputs, expected.concat());
+    let done = run("exit 3; ").exit(0);
+    assert!(
+        done.stdout.contains("        --stimulus overload-low: the command ended with exit code 3\n"),
+        "{}",
+        done.stdout
+    );
+    let left = "the input of the device may not be normal: --stimulus normal: the command ended with exit code 3";
+    assert!(done.stderr.contains(left), "{}", done.stderr);
+    let done = bench.run("conform 1 --only 404").exit(0);
+    assert!(done.stdout.contains("        not run without --stimulus\n"), "{}", done.stdout);
+}
+
+#[test]
+fn interrupted_stimulus_is_followed_by_the_normal_one() {
+    let bench = Bench::of("mh4@1");
+    let log = bench.path("inputs").display().to_string();
+    let stimulus = format!("f() {{ echo $1 >>{log}; [ $1 = normal ] || {{ kill -INT $PPID; exec sleep 60; }}; }}; f");
+    bench.run_words(&["conform", "1", "--only", "404", "--stimulus", &stimulus]).exit(130);
+    assert_eq!(std::fs::read_to_string(&log).expect("the file"), "overload-high\nnormal\n");
+}

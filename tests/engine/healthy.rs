@@ -123,7 +123,7 @@ fn conform_finds_no_deviation_on_a_device_without_a_fault() {
         let file = eds::read(eds_text::eds_text(&model).as_bytes()).expect("an EDS file");
         let options = ConformOptions { store: seed % 2 == 0, eds: Some(Arc::new(file)), ..ConformOptions::default() };
         let mut master = Master::new(&mut bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
-        let result = conform(&mut master, node, &Overrides::new(), &options, &mut NoJournal, &mut |_| {});
+        let result = conform(&mut master, node, &Overrides::new(), &options, None, &mut NoJournal, &mut |_| {});
         match result {
             Ok(report) => {
                 let deviations = report.results.iter().filter(|result| result.is_new_deviation());

@@ -284,7 +284,12 @@ def judged(cangauge, directory, expected, program, *arguments):
         details = "\n".join(f"{name}: {cases[name]['details']}" for name in sorted(found ^ set(expected)))
         differing = f"not expected: {found - set(expected)}, not reported: {set(expected) - found}\n{details}"
         assert found == set(expected), differing
-        not_judged = [name for name, case in cases.items() if case["verdict"] == "not-judged"]
+        # Nothing changes the input of these devices.
+        not_judged = [
+            name
+            for name, case in cases.items()
+            if case["verdict"] == "not-judged" and case["details"] != ["not run without --stimulus"]
+        ]
         assert not_judged == [], not_judged
         assert result["not_restored"] == [], result["not_restored"]
         assert "arrive twice" not in done.err, done.err

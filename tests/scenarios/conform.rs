@@ -21,9 +21,9 @@ use cangauge::output::conform::finding;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Setup, State};
 use cangauge::tasks::config::{Journal, Snapshot};
-use cangauge::tasks::conform::{Area, ConformOptions, ConformReport, Statistic, Verdict, cases, conform};
+use cangauge::tasks::conform::{Area, ConformOptions, ConformReport, Input, Statistic, Verdict, cases, conform};
 use cangauge::tasks::{Failure, Kind};
-use deviant::{Deviant, Deviation, NODE};
+use deviant::{Deviant, Deviation, NODE, Switch};
 use eds_text::eds_text;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, LazyLock};
@@ -52,6 +52,7 @@ fn model(kind: &str) -> Arc<Model> {
 }
 
 fn bus(kind: &str, deviation: Option<Deviation>) -> MemoryBus {
+    Switch::reset();
     let mut bus = MemoryBus::new(Clock::Virtual);
     let mut setup = Setup::new(model(kind), node());
     if kind == "large" {
@@ -65,7 +66,7 @@ fn bus(kind: &str, deviation: Option<Deviation>) -> MemoryBus {
 fn run(bus: &mut dyn Bus, kind: &str, options: &ConformOptions) -> Result<ConformReport, Failure> {
     let mut master = Master::new(bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
     let overrides: Overrides = if kind == "large" { [(node(), model(kind))].into() } else { Overrides::new() };
-    conform(&mut master, node(), &overrides, options, &mut NoJournal, &mut |_| {})
+    conform(&mut master, node(), &overrides, options, Some(&mut Switch), &mut NoJournal, &mut |_| {})
 }
 
 /// The EDS file of a device, with some texts replaced.
@@ -132,6 +133,15 @@ fn simulated_devices_have_only_the_deviations_of_their_manuals() {
         let found = report.results.iter().filter_map(|result| Some((result.case.id, result.known.as_deref()?)));
         assert_eq!(found.collect::<Vec<_>>(), expected, "{kind}");
         assert_eq!(report.not_restored, [], "{kind}");
+        let is_pass = |id: &&str| report.results.iter().any(|one| one.case.id == *id && one.verdict.name() == "pass");
+        let overloads = ["404-70", "404-71", "404-72", "404-73", "404-74"].into_iter().filter(is_pass);
+        let shown: &[&str] = match kind {
+            "mh4" => &["404-70", "404-71", "404-72", "404-74"],
+            "dps" => &["404-70", "404-71", "404-73", "404-74"],
+            "hydac" => &["404-70", "404-71", "404-74"],
+            _ => &[],
+        };
+        assert_eq!(overloads.collect::<Vec<_>>(), shown, "{kind}");
         assert!(report.length < Duration::from_secs(60), "{kind}: {:?}", report.length);
         assert_eq!(differences(&mut bus, &before), [""; 0], "{kind}");
     }
@@ -329,6 +339,9 @@ fn interrupted(kind: &str, area: Area, store: bool, step: impl Fn(usize) -> usiz
             Ok(report) => found.extend(report.not_restored.iter().map(|object| format!("not restored: {object}"))),
             Err(failure) if failure.kind() == Kind::Interrupted && failure.effects.is_empty() => {}
             Err(failure) => found.push(format!("{failure}: {:?}", failure.effects)),
+        }
+        if Switch::input() != Input::Normal {
+            found.push("the input is not normal".to_owned());
         }
         if !found.is_empty() {
             wrong.push(format!("{kind} {area}, store {store}, {at} of {count} ({}): {found:?}", clean.sent[at]));

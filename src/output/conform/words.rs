@@ -4,7 +4,7 @@ use crate::bus::time::format_duration;
 use crate::device::scalar::Scalar;
 use crate::output::failure::ErrorMessage;
 use crate::output::text::spaced_bytes;
-use crate::tasks::conform::{Expected, Figure, Finding, Seen, Statistic, WhyNot};
+use crate::tasks::conform::{Expected, Figure, Finding, Seen, Statistic, StimulusFailure, WhyNot};
 use std::time::Duration;
 
 /// A finding in one line: the object, what was expected, and what was seen.
@@ -107,6 +107,10 @@ fn expected(expected: &Expected) -> String {
         Expected::Limits(low, high) => limits(low.as_ref(), high.as_ref()),
         Expected::Mapped => "an accepted mapping".to_owned(),
         Expected::GenericErrorBit => "bit 0 set".to_owned(),
+        Expected::BitsSet(bits) => format!("the bits 0x{bits:X}"),
+        Expected::BitsClear(bits) => format!("none of the bits 0x{bits:X}"),
+        Expected::Marker => "NaN or the smallest integer".to_owned(),
+        Expected::Emergency(code) => format!("an emergency with code {code:04X}h"),
         Expected::Above(value) => format!("more than {}", short(*value)),
         Expected::UnitLike(unit) => format!("a unit that can be converted to {unit}"),
         Expected::Measured { value, tolerance } => format!("{} (+/- {})", short(*value), short(*tolerance)),
@@ -176,7 +180,20 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::NotMoved(object) => format!("{object} did not change enough"),
         WhyNot::NearZero(object) => format!("{object} is too close to zero"),
         WhyNot::NoValidValue(object) => format!("{object} is not valid, or at the end of its range"),
+        WhyNot::NoStimulus => "not run without --stimulus".to_owned(),
+        WhyNot::Stimulus(input, failure) => format!("--stimulus {}: {}", input.name(), stimulus_failure(failure)),
         WhyNot::Failed(failure) => ErrorMessage::of(failure).message,
+    }
+}
+
+/// Why the command of `--stimulus` failed.
+pub(in crate::output) fn stimulus_failure(failure: &StimulusFailure) -> String {
+    match failure {
+        StimulusFailure::NotStarted(reason) => format!("the command was not started: {reason}"),
+        StimulusFailure::Exit(Some(code)) => format!("the command ended with exit code {code}"),
+        StimulusFailure::Exit(None) => "a signal ended the command".to_owned(),
+        StimulusFailure::TimedOut(time) => format!("the command did not end within {}", duration(*time)),
+        StimulusFailure::Interrupted => "the command was interrupted".to_owned(),
     }
 }
 

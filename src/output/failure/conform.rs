@@ -2,9 +2,10 @@
 
 use super::CauseText;
 use crate::canopen::object::ObjectId;
+use crate::output::conform::stimulus_failure;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
-use crate::tasks::conform::{ConformEffect, ConformFailure};
+use crate::tasks::conform::{ConformEffect, ConformFailure, Input, StimulusFailure};
 
 /// The message and the hint for a cause.
 pub(super) fn words(failure: &Failure, cause: &ConformFailure) -> CauseText {
@@ -40,7 +41,14 @@ pub(in crate::output) fn effect(node: &str, effect: &ConformEffect) -> NoteText 
         ConformEffect::Unknown => {
             NoteText::new("not-restored", "the settings could not be restored").command("undo", undo)
         }
+        ConformEffect::InputNotNormal(reason) => NoteText::new("input-not-normal", input_left(reason)),
     }
+}
+
+/// The input of the device is not as before.
+pub(in crate::output) fn input_left(reason: &StimulusFailure) -> String {
+    let normal = Input::Normal.name();
+    format!("the input of the device may not be normal: --stimulus {normal}: {}", stimulus_failure(reason))
 }
 
 /// Objects in one line.

@@ -60,14 +60,21 @@ impl Device {
                 }
                 self.send_emergencies(now, out);
             }
-            [signal, value] => {
-                self.memory.channels.hold(signal, value)?;
-                if self.phase != Phase::Off {
-                    self.update_overloads(now);
-                    self.send_emergencies(now, out);
-                }
-            }
+            [signal, value] => self.hold(signal, value, now, out)?,
             _ => return Err("unknown command".to_owned()),
+        }
+        Ok(())
+    }
+
+    /// Sets a signal to a constant value from now on: `pressure`, `5.2bar`.
+    ///
+    /// # Errors
+    /// The device has no such signal, or the value has no unit of the signal.
+    pub fn hold(&mut self, signal: &str, value: &str, now: Mono, out: &mut Outbox) -> Result<(), String> {
+        self.memory.channels.hold(signal, value)?;
+        if self.phase != Phase::Off {
+            self.update_overloads(now);
+            self.send_emergencies(now, out);
         }
         Ok(())
     }

@@ -151,6 +151,8 @@ pub enum Needs {
     Store,
     /// Both.
     SoleNodeAndStore,
+    /// The option `--stimulus`.
+    Stimulus,
 }
 
 impl Needs {
@@ -161,6 +163,7 @@ impl Needs {
             Needs::SoleNode => Some("no other node"),
             Needs::Store => Some("--store"),
             Needs::SoleNodeAndStore => Some("no other node, --store"),
+            Needs::Stimulus => Some("--stimulus"),
         }
     }
 
@@ -219,11 +222,17 @@ impl Case {
         Case { needs: Needs::SoleNode, ..self }
     }
 
+    /// The case needs another input of the device.
+    pub(super) const fn stimulated(self) -> Case {
+        Case { needs: Needs::Stimulus, ..self }
+    }
+
     /// The case writes to non-volatile memory, sets a node-ID or a bit rate, or executes autozero.
     pub(super) const fn stores(self) -> Case {
         let needs = match self.needs {
             Needs::Nothing | Needs::Store => Needs::Store,
             Needs::SoleNode | Needs::SoleNodeAndStore => Needs::SoleNodeAndStore,
+            Needs::Stimulus => Needs::Stimulus,
         };
         Case { needs, ..self }
     }

@@ -6,6 +6,7 @@ pub(super) mod autozero;
 pub(super) mod digits;
 pub(super) mod events;
 pub(super) mod filter;
+pub(super) mod overload;
 pub(super) mod unit;
 pub(super) mod values;
 

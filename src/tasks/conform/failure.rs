@@ -1,5 +1,6 @@
 //! Why a check of a device was refused or ended early.
 
+use super::stimulus::StimulusFailure;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -36,6 +37,8 @@ pub enum ConformEffect {
     NotRestored(Vec<ObjectId>),
     /// The settings could not be read back.
     Unknown,
+    /// The input of the device may not be as before.
+    InputNotNormal(StimulusFailure),
 }
 
 impl From<ConformFailure> for Cause {

@@ -1,6 +1,7 @@
 //! Verdicts: what was expected, and what was seen. The texts are in `output`.
 
 use super::figure::Figure;
+use super::stimulus::{Input, StimulusFailure};
 use crate::canopen::frame::Frame;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
@@ -116,6 +117,14 @@ pub enum Expected {
     Limits(Option<Scalar>, Option<Scalar>),
     /// An accepted mapping of the object.
     Mapped,
+    /// A number with all of these bits.
+    BitsSet(u64),
+    /// A number without these bits.
+    BitsClear(u64),
+    /// The marker of an overload: NaN, or the smallest integer.
+    Marker,
+    /// An emergency with this code.
+    Emergency(u16),
     /// A value above this one.
     Above(f64),
     /// A unit that can be converted to this one.
@@ -223,6 +232,10 @@ pub enum WhyNot {
     NearZero(ObjectId),
     /// The process value is not valid, or at the end of its range.
     NoValidValue(ObjectId),
+    /// The input of the device cannot be changed, because there is no stimulus.
+    NoStimulus,
+    /// The input could not be set.
+    Stimulus(Input, StimulusFailure),
     /// A request failed.
     Failed(Box<Failure>),
 }

@@ -20,6 +20,7 @@ mod pdo;
 mod sdo;
 mod session;
 mod settings;
+mod stimulus;
 mod store;
 mod timing;
 
@@ -27,6 +28,7 @@ pub use case::{Area, Case, Needs, Severity};
 pub use failure::{ConformEffect, ConformFailure};
 pub use figure::{Figure, Statistic};
 pub use finding::{Expected, Finding, Seen, Verdict, WhyNot};
+pub use stimulus::{Input, Stimulus, StimulusFailure};
 
 use crate::bus::{Filters, Stamp};
 use crate::canopen::id::NodeId;
@@ -41,7 +43,6 @@ use crate::tasks::config::{self, Journal};
 use crate::tasks::settings::open;
 use crate::tasks::{Failure, Kind};
 use session::Session;
-use settings::Settings;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -57,6 +58,7 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
         cia404::filter::CASES,
         cia404::autozero::CASES,
         cia404::events::CASES,
+        cia404::overload::CASES,
     ];
     sdo.into_iter().chain(others).chain(lower).chain(cia404).chain([eds::CASES, timing::CASES]).flatten()
 }
@@ -133,6 +135,8 @@ pub struct ConformReport {
     pub not_restored: Vec<ObjectId>,
     /// The NMT state.
     pub state: StateAfter,
+    /// Why the input of the device may not be as before.
+    pub input_failure: Option<StimulusFailure>,
 }
 
 /// Runs the cases on a node, and restores its settings and its NMT state.
@@ -146,6 +150,7 @@ pub fn conform(
     id: NodeId,
     overrides: &Overrides,
     options: &ConformOptions,
+    stimulus: Option<&mut dyn Stimulus>,
     journal: &mut dyn Journal,
     observe: &mut dyn FnMut(&CaseResult),
 ) -> Result<ConformReport, Failure> {
@@ -160,23 +165,9 @@ pub fn conform(
     if let Some(before) = &before {
         journal.begin(before)?;
     }
-    let mut session = Session {
-        master,
-        node,
-        eds: options.eds.clone(),
-        is_alone,
-        settings: Settings::default(),
-        initial_state: None,
-        used_nmt: false,
-        state_open: false,
-        guarded: false,
-        wrong_sync: false,
-        lss_open: false,
-        needs_reset: false,
-        stored: Vec::new(),
-        is_answer_open: false,
-        open_transfer: None,
-    };
+    // A shorter lifetime, that of the session.
+    let stimulus = stimulus.map(|stimulus| stimulus as &mut dyn Stimulus);
+    let mut session = Session::new(master, node, is_alone, options.eds.clone(), stimulus);
     session.read_settings(options.store)?;
     let started = session.master.bus().now();
     let run = session.begin().map_err(Failure::from).and_then(|()| session.run(options, observe));
@@ -187,17 +178,20 @@ pub fn conform(
     if restored.as_ref().is_ok_and(Vec::is_empty) {
         journal.finish();
     }
-    match (run, restored, state) {
+    let Session { node, input_failure, .. } = session;
+    let failure = match (run, restored, state) {
         (Ok(results), Ok(not_restored), Ok(state)) => {
-            Ok(ConformReport { node: session.node, started, length, results, not_restored, state })
+            return Ok(ConformReport { node, started, length, results, not_restored, state, input_failure });
         }
-        (Ok(_), Err(error), _) | (Ok(_), Ok(_), Err(error)) => {
-            Err(Failure::from(error).with(id, ConformEffect::Unknown))
-        }
-        (Err(failure), Ok(objects), _) if objects.is_empty() => Err(failure),
-        (Err(failure), Ok(objects), _) => Err(failure.with(id, ConformEffect::NotRestored(objects))),
-        (Err(failure), Err(_), _) => Err(failure.with(id, ConformEffect::Unknown)),
-    }
+        (Ok(_), Err(error), _) | (Ok(_), Ok(_), Err(error)) => Failure::from(error).with(id, ConformEffect::Unknown),
+        (Err(failure), Ok(objects), _) if objects.is_empty() => failure,
+        (Err(failure), Ok(objects), _) => failure.with(id, ConformEffect::NotRestored(objects)),
+        (Err(failure), Err(_), _) => failure.with(id, ConformEffect::Unknown),
+    };
+    Err(match input_failure {
+        Some(reason) => failure.with(id, ConformEffect::InputNotNormal(reason)),
+        None => failure,
+    })
 }
 
 /// Reads the node and its settings. If the settings cannot be read in the form of a file, there is no journal.

@@ -1,6 +1,7 @@
 //! The node under test, and the requests that the cases use.
 
 use super::settings::Settings;
+use super::stimulus::{Stimulus, StimulusFailure};
 use crate::bus::Received;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
@@ -32,6 +33,12 @@ pub(super) struct Session<'s, 'bus> {
     pub(super) node: Node,
     /// The EDS file that is compared with the device.
     pub(super) eds: Option<Arc<Eds>>,
+    /// Changes the input of the device.
+    pub(super) stimulus: Option<&'s mut dyn Stimulus>,
+    /// Whether the input may not be the normal one.
+    pub(super) is_input_changed: bool,
+    /// Why the normal input could not be set again.
+    pub(super) input_failure: Option<StimulusFailure>,
     /// Whether no other node is on the bus.
     pub(super) is_alone: bool,
     /// The settings before the first case.
@@ -63,6 +70,37 @@ pub(super) fn request(command: u8, object: ObjectId, data: [u8; 4]) -> [u8; 8] {
     let [a, b, c] = object.multiplexer();
     let [d, e, f, g] = data;
     [command, a, b, c, d, e, f, g]
+}
+
+impl<'s, 'bus> Session<'s, 'bus> {
+    pub(super) fn new(
+        master: &'s mut Master<'bus>,
+        node: Node,
+        is_alone: bool,
+        eds: Option<Arc<Eds>>,
+        stimulus: Option<&'s mut dyn Stimulus>,
+    ) -> Session<'s, 'bus> {
+        Session {
+            master,
+            node,
+            eds,
+            stimulus,
+            is_input_changed: false,
+            input_failure: None,
+            is_alone,
+            settings: Settings::default(),
+            initial_state: None,
+            used_nmt: false,
+            state_open: false,
+            guarded: false,
+            wrong_sync: false,
+            lss_open: false,
+            needs_reset: false,
+            stored: Vec::new(),
+            is_answer_open: false,
+            open_transfer: None,
+        }
+    }
 }
 
 impl Session<'_, '_> {

@@ -182,6 +182,7 @@ impl Session<'_, '_> {
             self.master.discard_answers(SETTLE * 5)?;
             self.is_answer_open = false;
         }
+        self.restore_input()?;
         self.leave_lss()?;
         if self.needs_reset {
             self.reset(NmtCommand::ResetNode)?;

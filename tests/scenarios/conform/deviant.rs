@@ -6,6 +6,8 @@ use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::CanId;
 use cangauge::device::catalog::Model;
 use cangauge::sim::Device;
+use cangauge::tasks::conform::{Input, Stimulus, StimulusFailure};
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -81,11 +83,64 @@ pub(super) struct Deviant {
     pub(super) device: Device,
     deviation: Option<Deviation>,
     memory: Memory,
+    input: Input,
+    /// When the input is compared with that of the switch.
+    next_look: Mono,
 }
+
+thread_local! {
+    /// The input of the devices of this test.
+    static INPUT: Cell<Input> = const { Cell::new(Input::Normal) };
+}
+
+/// Changes the input of the device.
+pub(super) struct Switch;
+
+impl Switch {
+    pub(super) fn reset() {
+        INPUT.set(Input::Normal);
+    }
+
+    pub(super) fn input() -> Input {
+        INPUT.get()
+    }
+}
+
+impl Stimulus for Switch {
+    fn set(&mut self, input: Input) -> Result<(), StimulusFailure> {
+        INPUT.set(input);
+        Ok(())
+    }
+}
+
+/// The time between two looks at the switch.
+const LOOK: Duration = Duration::from_millis(10);
 
 impl Deviant {
     pub(super) fn new(model: Arc<Model>, device: Device, deviation: Option<Deviation>) -> Deviant {
-        Deviant { model, device, deviation, memory: Memory::default() }
+        Deviant { model, device, deviation, memory: Memory::default(), input: Input::Normal, next_look: Mono::START }
+    }
+
+    /// Sets the process value of the input that the test has chosen.
+    fn look(&mut self, now: Mono, out: &mut Outbox) {
+        self.next_look = now + LOOK;
+        let input = INPUT.get();
+        if std::mem::replace(&mut self.input, input) == input {
+            return;
+        }
+        let values = match self.model.description.name.as_str() {
+            "mh4" => ["1.2bar", "20bar", "-5bar"],
+            "dps" => ["17psi", "200psi", "-50psi"],
+            "hydac" => ["120bar", "600bar", "-90bar"],
+            other => panic!("{other} shows no overload"),
+        };
+        let value = values[[Input::Normal, Input::OverloadHigh, Input::OverloadLow]
+            .iter()
+            .position(|one| *one == input)
+            .expect("an input")];
+        let mut inner = Outbox::default();
+        self.device.hold("pressure", value, now, &mut inner).expect("a value");
+        self.send(now, &mut inner, out);
     }
 
     fn note(&mut self, frame: &Frame) {
@@ -179,13 +234,18 @@ impl Station for Deviant {
     }
 
     fn wake(&mut self, now: Mono, out: &mut Outbox) {
-        let mut inner = Outbox::default();
-        self.device.wake(now, &mut inner);
-        self.send(now, &mut inner, out);
+        if self.next_look <= now {
+            self.look(now, out);
+        }
+        if self.device.next_wake().is_some_and(|due| due <= now) {
+            let mut inner = Outbox::default();
+            self.device.wake(now, &mut inner);
+            self.send(now, &mut inner, out);
+        }
     }
 
     fn next_wake(&self) -> Option<Mono> {
-        self.device.next_wake()
+        self.device.next_wake().into_iter().chain([self.next_look]).min()
     }
 
     fn sent(&mut self, now: Mono, frame: &Frame) {

@@ -39,6 +39,8 @@ fn count_zeros(memory: &mut Memory, frame: &Frame) {
     memory.count += u32::from(matches!(frame.data(), [0x60, 0x25 | 0x27, 0x61, 1, ..]));
 }
 
+const ZERO: [u8; 3] = [0x25, 0x61, 1];
+const STATUS: [u8; 3] = [0x50, 0x61, 1];
 const DELTA: [u8; 3] = [0x33, 0x61, 1];
 const LOWER: [u8; 3] = [0x34, 0x61, 1];
 
@@ -91,7 +93,14 @@ pub(super) const ROWS: &[Row] = &[
         }),
     ),
     // An overload within the span.
-    ("mh4", "404-05", Sends(|memory, frame| read(memory, frame, [0x50, 0x61, 1], |data| data[4] = 2))),
+    (
+        "mh4",
+        "404-05",
+        Sends(|memory, frame| {
+            // Only before the cases of autozero and overload.
+            if memory.was_written(ZERO) { vec![frame] } else { read(memory, frame, STATUS, |data| data[4] = 2) }
+        }),
+    ),
     (
         "mh4",
         "404-06",
@@ -197,5 +206,26 @@ pub(super) const ROWS: &[Row] = &[
         "mh4",
         "404-64",
         Ignores(|memory, _, frame| is_nmt(frame, 0x80, NODE) && memory.nmt[1] == 0x01 && is_event_driven(memory)),
+    ),
+    ("mh4", "404-70", Sends(|memory, frame| read(memory, frame, STATUS, |data| data[4] &= !2))),
+    ("mh4", "404-71", Sends(|memory, frame| read(memory, frame, STATUS, |data| data[4] &= !4))),
+    (
+        "mh4",
+        "404-72",
+        Sends(|_, frame| integer(frame, [0x30, 0x71, 1], |value| if value == i16::MIN { 12_000 } else { value })),
+    ),
+    ("dps", "404-73", Sends(|_, frame| if frame.data().starts_with(&[0x01, 0x32]) { Vec::new() } else { vec![frame] })),
+    (
+        "mh4",
+        "404-74",
+        Sends(|memory, frame| {
+            // The fourth overload stays.
+            let is_status = memory.request.is_some_and(|request| is(request, &[0x40, 0x50, 0x61, 1]));
+            let [0x4f, _, _, _, status, ..] = *frame.data() else { return vec![frame] };
+            if is_status && (status != 0) != (memory.count % 2 == 1) && memory.count < 8 {
+                memory.count += 1;
+            }
+            if is_status && memory.count >= 8 { with(frame, |data| data[4] = 3) } else { vec![frame] }
+        }),
     ),
 ];

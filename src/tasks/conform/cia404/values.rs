@@ -136,7 +136,7 @@ fn equal_values_of(session: &mut Session<'_, '_>, channel: &Channel) -> Result<V
 const FAMILIES: [u16; 4] = [0x6000, 0x9000, 0x8000, 0x7000];
 
 /// Start and end of the span in each family.
-fn spans(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Vec<[Number; 2]>, Error> {
+pub(super) fn spans(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Vec<[Number; 2]>, Error> {
     let all = numbers(session, channel)?;
     let find = |index: u16| all.iter().find(|number| number.object.index == index).copied();
     let span = |family: u16| Some([find(family | 0x148)?, find(family | 0x149)?]);
@@ -147,8 +147,8 @@ fn spans(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Vec<[Number
 const BEYOND: f64 = 0.05;
 
 /// The bits of an overload.
-const POSITIVE: u64 = 0b010;
-const NEGATIVE: u64 = 0b100;
+pub(super) const POSITIVE: u64 = 0b010;
+pub(super) const NEGATIVE: u64 = 0b100;
 
 fn status(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     check_channels(session, ALL, |session, channel| {

@@ -1,0 +1,92 @@
+//! A shell command of the user. It receives no text from a device.
+
+use super::interrupt::Interrupts;
+use std::io;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// The time between two checks whether the command has ended.
+const STEP: Duration = Duration::from_millis(20);
+
+/// Why a command did not end with exit code 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ProgramError {
+    /// It could not be started. The reason is a text of the system.
+    NotStarted(String),
+    /// It ended with this exit code; `None` if a signal ended it.
+    Exit(Option<i32>),
+    /// It did not end within the time.
+    TimedOut,
+    /// Ctrl-C while it was running.
+    Interrupted,
+}
+
+/// A shell command.
+pub struct ShellCommand<'a> {
+    command: &'a str,
+    timeout: Duration,
+    interrupts: Interrupts,
+}
+
+impl ShellCommand<'_> {
+    /// A command that may run for `timeout`.
+    ///
+    /// # Errors
+    /// As [`Interrupts::new`].
+    pub fn new(command: &str, timeout: Duration) -> io::Result<ShellCommand<'_>> {
+        Ok(ShellCommand { command, timeout, interrupts: Interrupts::new()? })
+    }
+
+    /// Runs the command with an argument, and waits for its end. Its standard output is written to standard error.
+    ///
+    /// # Errors
+    /// It did not end with exit code 0. After a time-out or Ctrl-C, it is killed.
+    pub fn run(&mut self, argument: &str) -> Result<(), ProgramError> {
+        // The bus reports earlier signals.
+        while self.interrupts.take() {}
+        let mut child = Command::new("sh")
+            .args(["-c", &format!("{} \"$@\"", self.command), "sh", argument])
+            .stdout(Stdio::from(io::stderr()))
+            .spawn()
+            .map_err(|error| ProgramError::NotStarted(error.to_string()))?;
+        let result = self.wait(&mut child);
+        if result.is_err() {
+            // It may have ended already.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+        result
+    }
+
+    fn wait(&mut self, child: &mut Child) -> Result<(), ProgramError> {
+        for _ in 0..self.timeout.as_millis() / STEP.as_millis() {
+            match child.try_wait() {
+                Ok(Some(status)) if status.success() => return Ok(()),
+                // The terminal sends Ctrl-C to the command, too.
+                Ok(Some(_)) if self.interrupts.take() => return Err(ProgramError::Interrupted),
+                Ok(Some(status)) => return Err(ProgramError::Exit(status.code())),
+                Ok(None) => {}
+                Err(error) => return Err(ProgramError::NotStarted(error.to_string())),
+            }
+            if self.interrupts.wait_for(STEP) {
+                return Err(ProgramError::Interrupted);
+            }
+        }
+        Err(ProgramError::TimedOut)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failure_and_time_out_are_distinguished() {
+        let run = |command: &str, argument: &str| {
+            ShellCommand::new(command, Duration::from_millis(500)).expect("signals").run(argument)
+        };
+        assert_eq!(run("exec sleep 60; ", "low"), Err(ProgramError::TimedOut));
+        assert_eq!(run("test low =", "low"), Ok(()));
+        assert_eq!(run("test low =", "normal"), Err(ProgramError::Exit(Some(1))));
+    }
+}
