@@ -128,11 +128,12 @@ impl Report for ResultRow {
 pub fn summary(report: &ConformReport) -> String {
     let count = |wanted: fn(&CaseResult) -> bool| report.results.iter().filter(|result| wanted(result)).count();
     let deviates = |result: &CaseResult| matches!(result.verdict, Verdict::Deviates(_));
+    let known = report.results.iter().filter(|result| deviates(result) && result.known.is_some()).count();
     let counts = [
         (count(|result| matches!(result.verdict, Verdict::Pass)), "pass"),
         (count(|result| matches!(result.verdict, Verdict::Measured(_))), "measured"),
         (count(CaseResult::is_new_deviation), "deviate"),
-        (report.results.iter().filter(|result| deviates(result) && result.known.is_some()).count(), "known deviations"),
+        (known, if known == 1 { "known deviation" } else { "known deviations" }),
         (count(|result| matches!(result.verdict, Verdict::NotJudged(_))), "not judged"),
         (count(|result| matches!(result.verdict, Verdict::NotApplicable(_))), "not applicable"),
     ];

@@ -29,7 +29,7 @@ pub(super) const CASES: &[Case] = &[
         .matters(Medium, "Masters do not notice the error."),
     case(
         "EMC-05",
-        "An emergency has eight bytes, and its register is that of 1001h",
+        "An emergency has eight bytes, and its error register is equal to 1001h",
         "CiA 301, EMCY protocol",
         emergency,
     )

@@ -22,7 +22,7 @@ const CONFIGURE: &str = "CiA 305, configuration services";
 pub(super) const CASES: &[Case] = &[
     case("LSS-01", "Switch state global is not answered", SWITCH, global)
         .matters(Medium, "Masters assign the answer to the wrong service."),
-    case("LSS-02", "The inquired address is that of 1018h", INQUIRE, address)
+    case("LSS-02", "The inquired LSS address is equal to 1018h", INQUIRE, address)
         .matters(High, "The device cannot be addressed by the numbers that tools show."),
     case("LSS-03", "The inquired node-ID is the present node-ID", INQUIRE, node_id)
         .matters(Medium, "Tools show a wrong node-ID."),
@@ -32,10 +32,15 @@ pub(super) const CASES: &[Case] = &[
         .matters(High, "One of several devices cannot be given a node-ID."),
     case("LSS-06", "Switch state selective with another serial number is not answered", SWITCH, other_address)
         .matters(High, "Another device gets the node-ID."),
-    case("LSS-07", "Identify remote slave is answered for a range with the device", IDENTIFY, identified)
+    case("LSS-07", "Identify remote slave is answered for a range that contains the device", IDENTIFY, identified)
         .matters(Medium, "Masters do not find the device."),
-    case("LSS-08", "Identify remote slave is not answered for a range without the device", IDENTIFY, not_identified)
-        .matters(High, "Masters find devices that do not exist."),
+    case(
+        "LSS-08",
+        "Identify remote slave is not answered for a range that does not contain the device",
+        IDENTIFY,
+        not_identified,
+    )
+    .matters(High, "Masters find devices that do not exist."),
     case(
         "LSS-09",
         "A device with a node-ID does not answer fastscan and identify non-configured slave",

@@ -29,7 +29,8 @@ pub(super) const CASES: &[Case] = &[
     case("TIM-02", "The time to acknowledge a write", SDO, writes),
     case("TIM-03", "The interval of heartbeats if 1017h is 100 ms", "CiA 301, heartbeat protocol", heartbeats),
     case("TIM-04", "The interval of TPDOs if the event timer is 100 ms", "CiA 301, event timer", tpdos).alone(),
-    case("TIM-05", "The longest silence while the device answers reads and sends TPDOs", SDO, silence).alone(),
+    case("TIM-05", "The longest interval without a frame while the device answers reads and sends TPDOs", SDO, silence)
+        .alone(),
     case("TIM-06", "The time from a reset of the node to its boot-up message", NMT, boot_node),
     case("TIM-07", "The time from a reset of the communication to the boot-up message", NMT, boot_communication),
 ];
