@@ -38,8 +38,8 @@ fn version_only(words: &[OsString]) -> Option<Command> {
     matches!(words, [_, word] if is_version(word)).then(program)
 }
 
-/// The program with only one command: the first word that is the name of a command. If this word is the value of an
-/// option, parsing fails, and the complete program parses the words again.
+/// The program with only one command. Its name is the first word that is the name of any command. If this word is the
+/// value of an option, parsing fails, and the complete program parses the words again.
 fn single_command(words: &[OsString]) -> Option<Command> {
     let named = |word: &OsString| ARGUMENTS.iter().find(|(names, _)| names.iter().any(|name| word == name));
     let (names, arguments) = words.iter().skip(1).find_map(named)?;

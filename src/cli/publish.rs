@@ -87,7 +87,7 @@ pub(crate) struct Publish {
     /// File with a token or with USER:PASSWORD [default: the environment variable CANGAUGE_TOKEN]
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
-    /// With TLS: trust only these certificates of authorities [default: those of the system]
+    /// With TLS: trust only the certificates in this file [default: the authorities that the system trusts]
     #[arg(long, value_name = "FILE")]
     ca: Option<PathBuf>,
     /// Show how far the recordings are published, and send nothing

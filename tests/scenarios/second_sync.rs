@@ -211,7 +211,7 @@ fn nodes_are_not_started_beside_another_nmt_master() {
         ("000#0109", "\"start\" to node 9", sync),
         ("000#8000", "\"enter pre-operational\" to all nodes", Mode::AsSent),
     ] {
-        let note = format!("not started, because another NMT master sent {sent}: node 5; start all nodes: log --start");
+        let note = format!("node 5 was not started: another NMT master sent {sent}; start all nodes: log --start");
         assert_eq!(beside(frame, mode, false), (vec![note], Some(State::PreOperational), false), "{frame}");
     }
     assert!(beside("000#0109", sync, true).2, "--start");

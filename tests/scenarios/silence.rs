@@ -149,22 +149,25 @@ fn node_that_left_operational_is_named_at_the_end() {
     let remarks = |case: Case, others: &[(u64, &'static str)]| -> Vec<String> {
         let report = Case { seconds: Some(4), ..case }.with_other_frames(others).run().0.expect("a report");
         assert!(report.rows > 0);
-        report.remarks.iter().map(remark_text).filter(|text| text.contains("left operational")).collect()
+        report.remarks.iter().map(remark_text).filter(|text| text.contains("no longer operational")).collect()
     };
     let synced = || Case::mh4(WITH_HEARTBEAT).sync(100);
     let preop = [(2000, "000#8005"), (2010, "085#3081110000000000")];
     assert_eq!(
         remarks(synced(), &preop),
-        ["node 5 left operational: it is pre-operational again after the start, emergency 8130h"]
+        ["node 5 is no longer operational: it is pre-operational again after the start, emergency 8130h"]
     );
-    assert_eq!(remarks(synced(), &[(2000, "000#0205")]), ["node 5 left operational: it is stopped after the start"]);
+    assert_eq!(
+        remarks(synced(), &[(2000, "000#0205")]),
+        ["node 5 is no longer operational: it is stopped after the start"]
+    );
     assert_eq!(remarks(synced(), &[(2000, "000#8005"), (2500, "000#0105")]), [""; 0], "it is operational again");
     // A polled node has values in each state.
     let polled = || Case { poll: true, ..Case::mh4(WITH_HEARTBEAT) };
     assert_eq!(remarks(polled(), &[]), [""; 0], "it was never operational");
     assert_eq!(
         remarks(polled(), &[(500, "000#0105"), (2000, "000#8005")]),
-        ["node 5 left operational: it is pre-operational"]
+        ["node 5 is no longer operational: it is pre-operational"]
     );
 }
 

@@ -202,7 +202,7 @@ impl Slcan {
                 let what = match (step, self.channel) {
                     (Step::Rate(_), Some((bit_rate, _))) => format!("the bit rate {bit_rate}"),
                     (Step::Silent(_) | Step::Listen, _) => "the listen-only mode".to_owned(),
-                    _ => "to open the channel".to_owned(),
+                    _ => "the command to open the channel".to_owned(),
                 };
                 let why = format!("{} rejects {what}", self.firmware);
                 if !self.is_retiming {

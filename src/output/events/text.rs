@@ -172,18 +172,13 @@ pub fn remark_text(remark: &Remark) -> String {
         }
         Remark::NotReadAgain(node) => format!("node {node} could not be read again: its later frames were ignored"),
         Remark::LeftOperational(nodes) => left_operational(nodes),
-        Remark::NotStarted(nodes) => {
-            let nodes = listed(nodes);
-            format!("not started, because log starts only sensors: node {nodes}; start all nodes: log --start")
+        Remark::NotStarted(nodes) => not_started(nodes, "log starts only sensors"),
+        Remark::OtherNmtMaster(nodes, command, target) => {
+            let target = target.map_or_else(|| "all nodes".to_owned(), |node| format!("node {node}"));
+            not_started(nodes, &format!("another NMT master sent \"{}\" to {target}", command_text(*command)))
         }
-        Remark::OtherNmtMaster(nodes, command, target) => format!(
-            "not started, because another NMT master sent \"{}\" to {}: node {}; start all nodes: log --start",
-            command_text(*command),
-            target.map_or_else(|| "all nodes".to_owned(), |node| format!("node {node}")),
-            listed(nodes)
-        ),
         Remark::NotOperational(node, silence) => {
-            format!("node {node} left operational: {}", diagnosis::reason(silence))
+            format!("node {node} is no longer operational: {}", diagnosis::reason(silence))
         }
         Remark::StatesNotRestored(failure) => {
             format!("the nodes' states were not restored: {}", ErrorMessage::of(failure).message)
@@ -218,6 +213,12 @@ pub(in crate::output) fn left_operational(nodes: &[NodeId]) -> String {
             listed(nodes)
         ),
     }
+}
+
+fn not_started(nodes: &[NodeId], why: &str) -> String {
+    let subject = if nodes.len() == 1 { "node" } else { "nodes" };
+    let verb = if nodes.len() == 1 { "was" } else { "were" };
+    format!("{subject} {} {verb} not started: {why}; start all nodes: log --start", listed(nodes))
 }
 
 /// `1, 2, 3`.

@@ -138,7 +138,8 @@ fn identification_by_range() {
     ask(&mut bed, 0, 20002, "4F");
 }
 
-/// Searches as in CiA 305: the upper bits of each part, then the complete part with the number of the next part.
+/// Searches as in CiA 305. Finds each part bit by bit, from the highest bit. Then confirms the whole part, with the
+/// number of the next part in the same request.
 fn fastscan(bed: &mut TestBed) -> Identity {
     let mut found = [0; 4];
     bed.play(&[("5100000000800000", "4F")]);

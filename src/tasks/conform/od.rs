@@ -29,8 +29,13 @@ pub(super) const CASES: &[Case] = &[
         .matters(Medium, "Masters cannot distinguish this device from others; LSS needs all four numbers."),
     case("OD-04", "The vendor-ID (1018h:1) is not 0", "CiA 301, object 1018h", vendor)
         .matters(Medium, "The maker of the device is unknown to tools."),
-    case("OD-05", "Sub-index 0 is the highest sub-index of its object", "CiA 301, sub-index 0", highest_sub_index)
-        .matters(Low, "Tools that read the object dictionary miss entries, or report errors."),
+    case(
+        "OD-05",
+        "Sub-index 0 contains the highest sub-index of its object",
+        "CiA 301, sub-index 0",
+        highest_sub_index,
+    )
+    .matters(Low, "Tools that read the object dictionary miss entries, or report errors."),
     case("OD-06", "1001h and 1018h:1 reject a write", "CiA 301, objects 1001h and 1018h", read_only)
         .matters(Medium, "A wrong write changes the identity or hides an error."),
     case("OD-07", "1008h, 1009h and 100Ah are printable texts", "CiA 301, object 1008h", texts)
