@@ -47,7 +47,8 @@ impl Clocks {
             return Stamp { mono: self.read, wall: Wall::at(start.saturating_add(self.read.since_start())) };
         };
         let mut mono = self.place(wall, start);
-        // Compare once per batch: if the time still does not fit, the frame was received before the clock was set.
+        // The clock may have been set since the last comparison, so the clocks are compared again, once per batch. If
+        // the time is still impossible, the frame was received before the clock was set.
         if mono.is_none() && self.compared.is_some_and(|(at, _)| at < self.read) {
             let start = self.compare(now);
             // After a send, the recorded read time is only an estimate.
@@ -188,7 +189,7 @@ mod tests {
         assert_eq!(computer.stamp(&mut clocks, OPENED + 10), mono(10));
         clocks.batch(mono(101), true);
         assert_eq!(computer.stamp(&mut clocks, OPENED + 20), mono(20));
-        // Read at 101 and left empty: later frames are not older.
+        // The socket was empty at 101, so a frame of the next batch cannot be older than that.
         clocks.batch(mono(105), true);
         assert_eq!(computer.stamp(&mut clocks, OPENED + 100), mono(101));
     }
