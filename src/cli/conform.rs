@@ -22,12 +22,13 @@ use stimulus::StimulusCommand;
 ///
 /// The command runs a list of cases. Each case sends requests, right ones and wrong ones, and compares the answers with
 /// the standard. It prints a verdict for each case: pass, deviates, not-judged or not-applicable. A deviation that the
-/// manual of the device states is reported as known. The cases of the area "timing" print measured times and no verdict.
+/// manual of the device documents is reported as known. The cases of the area "timing" print measured times and no verdict.
 ///
 /// The device should be alone on the bus. If other nodes or other traffic are seen, only one area can be checked
 /// (--only). The command writes only objects of 1000h to 1FFFh and settings of the device profile. Afterwards all
-/// settings and the NMT state are as before. With --store, settings are also stored and restored for a while, and LSS
-/// sets the present node-ID; afterwards the present settings are stored. Autozero is executed and undone.
+/// settings and the NMT state are as before. With --store, the command also stores settings, restores factory
+/// defaults, sets the present node-ID by LSS, and executes and undoes autozero. At the end it stores the settings that
+/// the device had at the start.
 ///
 /// With --eds FILE, the EDS or DCF file is also checked against CiA 306 and compared with the device: existence, size,
 /// access, limits and mapping of each object, and with --store its defaults.
@@ -43,7 +44,28 @@ use stimulus::StimulusCommand;
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    after_help = "Areas:\n  sdo            SDO transfers\n  od             object dictionary\n  nmt            NMT states and boot-up\n  error-control  heartbeat and node guarding\n  pdo            TPDOs and mapping\n  emcy           emergencies and error history\n  store          store and restore\n  lss            LSS services\n  404            analogue inputs of CiA 404\n  eds            EDS file (--eds)\n  timing         timing profile: figures without a verdict\n\nExamples:\n  cangauge -b sim:mh4@1 conform 1\n  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22\n  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json\n  cangauge conform 5 --eds sensor.eds --report new.html\n  cangauge conform 5 --only 404 --stimulus ./pressure.sh\n  cangauge conform diff old.json new.json\n  cangauge -b sim:mh4@1 conform 1 --dry-run"
+    after_help = "\
+Areas:
+  sdo            SDO transfers
+  od             object dictionary
+  nmt            NMT states and boot-up
+  error-control  heartbeat and node guarding
+  pdo            TPDOs and mapping
+  emcy           emergencies and error history
+  store          store and restore
+  lss            LSS services
+  404            analogue inputs of CiA 404
+  eds            EDS file (--eds)
+  timing         timing profile: figures without a verdict
+
+Examples:
+  cangauge -b sim:mh4@1 conform 1
+  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22
+  cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json
+  cangauge conform 5 --eds sensor.eds --report new.html
+  cangauge conform 5 --only 404 --stimulus ./pressure.sh
+  cangauge conform diff old.json new.json
+  cangauge -b sim:mh4@1 conform 1 --dry-run"
 )]
 pub(crate) struct Conform {
     #[command(subcommand)]
@@ -91,9 +113,9 @@ enum Other {
 
 /// Compare two reports of conform, for example of an old and a new firmware
 ///
-/// The command lists the cases whose verdict or findings differ. Times of the area "timing" differ if a median or mean
-/// changes by more than half and 2 ms, or another figure by more than a factor of 3 and 10 ms. The exit code is 0 if
-/// nothing differs, and 1 otherwise.
+/// The command lists the cases whose verdict or findings differ. In the area "timing", a median or mean differs if it
+/// changes by more than 50 % and by more than 2 ms. Another figure differs if it changes by more than a factor of 3 and
+/// by more than 10 ms. The exit code is 0 if nothing differs, and 1 otherwise.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge conform diff old.json new.json")]
 struct Diff {

@@ -1,6 +1,6 @@
 //! Publishes one recording to one server: reads lines, sends them, and moves the position after the acknowledgement.
 //!
-//! The position file has the last position whose rows the server has certainly stored ([`recent`]).
+//! The position file has the last position whose rows the server has certainly stored (`recent`).
 //!
 //! [`Publisher::step`] performs one action: read, send, save rejected rows, or save the position. A publisher that ends
 //! between any two steps loses no row.

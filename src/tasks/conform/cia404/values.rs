@@ -13,8 +13,13 @@ const fn case(id: &'static str, sentence: &'static str, clause: &'static str, ru
 }
 
 pub(in super::super) const CASES: &[Case] = &[
-    case("404-01", "The unit (6131h) is one of the quantity of the sensor type (6110h)", "CiA 404, object 6131h", unit)
-        .matters(High, "Measurements are shown in a wrong unit."),
+    case(
+        "404-01",
+        "The unit (6131h) belongs to the physical quantity of the sensor type (6110h)",
+        "CiA 404, object 6131h",
+        unit,
+    )
+    .matters(High, "Measurements are shown in a wrong unit."),
     case("404-02", "Bits 0 to 7 of the unit code (6131h) are 0", "CiA 303-2, CiA 890", unit_code)
         .matters(Medium, "Tools do not recognise the unit."),
     case("404-03", "The number of decimal digits (6132h) is 9 or less", "CiA 404, object 6132h", digits)
