@@ -267,6 +267,22 @@ fn restarted_node_is_read_again_until_it_answers_completely() {
     assert_eq!(outcome.expect("a recording").events.changes, 0);
 }
 
+/// The serial number could not be read at first. After a restart it is read: it is not another device.
+#[test]
+fn serial_number_that_is_read_only_after_a_restart_shows_no_other_device() {
+    let text = format!("clock = \"virtual\"\n{DPS}");
+    let mut inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
+    inner.attach(Other::new(&[(3000, "000#8105")]));
+    let is_lost =
+        |received: &Received| received.frame.data().get(1..4) == Some(&[0x18, 0x10, 4]) && received.at.mono < at(3000);
+    let mut bus = UnstableBus { is_lost, ..UnstableBus::new(inner, &[]) };
+    let mut kept = RecordedRows::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(Mode::AsSent), &mut kept);
+    let outcome = outcome.expect("a recording");
+    assert!(kept.notes.contains(&LogEvent::ReadAgain(node(5), Vec::new())), "{:?}", kept.notes);
+    assert_eq!((outcome.replaced.len(), outcome.events.changes), (0, 0));
+}
+
 #[test]
 fn unit_that_was_not_stored_is_not_used_after_a_restart() {
     // Set to bar without storing: after a restart the unit is psi.

@@ -44,7 +44,9 @@ pub enum TpdoChange {
 pub(in crate::tasks) fn changes(before: &Node, now: &Node) -> Vec<Change> {
     let mut changes = Vec::new();
     let (old, new) = (&before.identity, &now.identity);
-    if (old.vendor, old.product, old.serial) != (new.vendor, new.product, new.serial) {
+    let parts = [(old.vendor, new.vendor), (old.product, new.product), (old.serial, new.serial)];
+    // A part that could not be read does not show another device.
+    if parts.into_iter().any(|(old, new)| old.zip(new).is_some_and(|(old, new)| old != new)) {
         changes.push(Change::Device(old.serial, new.serial));
     }
     for tpdo in &now.tpdos {
