@@ -31,8 +31,9 @@ pub(crate) fn bound(spec: &Spec) -> Duration {
         Command::Nmt { .. } | Command::NmtState { .. } if spec.falsifies_data() => LONGEST_HEARTBEAT,
         _ => Duration::ZERO,
     };
-    // Beside heavy traffic, a request and its answer wait for 5 % of the time of the bus, and a search asks all nodes.
+    // Beside heavy traffic, a request and its answer wait for 5 % of the time of the bus, and a search asks all nodes. With
+    // CANopen identifiers in the traffic, each of them seems to be present, and its identity is read.
     let is_busy = spec.others.iter().any(|other| matches!(other, Other::NoiseSender { .. }));
-    let search = if is_busy { ms(20) * 127 * 4 * (spec.retries + 1) } else { Duration::ZERO };
+    let search = if is_busy { ms(20) * 127 * 8 * (spec.retries + 1) } else { Duration::ZERO };
     ms(30_000) + unit * 60 + asked + search
 }
