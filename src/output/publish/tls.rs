@@ -58,7 +58,7 @@ pub fn trust_error(error: TrustError) -> ErrorMessage {
     let own = "name the file with the certificate of the authority: --ca FILE";
     match error {
         TrustError::Unsupported => ErrorMessage::usage("--to needs TLS, which this program does not contain")
-            .hint("use influx:// or mqtt:// in a trusted network, or through a tunnel (ssh -L)"),
+            .hint("build it with --features tls, or use influx:// or mqtt:// through a tunnel (ssh -L)"),
         TrustError::NoneInSystem(words) => {
             let words = words.map(|words| format!(": {words}")).unwrap_or_default();
             ErrorMessage::new(Kind::Io, format!("this computer has no certificates of authorities{words}"))
