@@ -241,7 +241,7 @@ impl<S: Sink> Publisher<S> {
             return self.idle(now);
         };
         if self.safe.file.is_empty() {
-            // The recording has just begun. Its place is saved for a start at the end.
+            // The file did not exist at the start of publish. After a restart, `--from end` must not skip its rows.
             let (file, identity) = (chunk.end.file.clone(), chunk.end.identity);
             self.safe.set_place(&Place { file, identity, ..Place::default() }, "");
             self.store(now.wall)?;

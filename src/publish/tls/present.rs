@@ -24,8 +24,8 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// The certificates in a file (PEM or DER), or those of the system. The environment variable `SSL_CERT_FILE` names
-    /// another file than that of the system.
+    /// Loads the certificates in a file (PEM or DER), or those of the system. If the environment variable
+    /// `SSL_CERT_FILE` or `SSL_CERT_DIR` is set, it replaces the certificates of the system.
     ///
     /// # Errors
     /// There are no certificates.

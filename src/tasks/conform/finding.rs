@@ -271,6 +271,13 @@ impl Finding {
     pub(super) fn at(object: ObjectId, expected: Expected, seen: Seen) -> Finding {
         Finding { object: Some(object), expected, seen }
     }
+
+    /// The finding if a value differs from the expected one by more than `tolerance`. All are in the unit of the channel.
+    pub(super) fn measured(object: ObjectId, expected: f64, tolerance: f64, seen: f64) -> Option<Finding> {
+        let is_wrong = (seen - expected).abs() > tolerance;
+        let expected = Expected::Measured { value: expected, tolerance };
+        is_wrong.then(|| Finding::at(object, expected, Seen::Measured(seen)))
+    }
 }
 
 impl Seen {

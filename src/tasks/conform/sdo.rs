@@ -71,6 +71,14 @@ pub(super) const CASES: &[Case] = &[
 
 const READS: &[u8] = &[0x43, 0x42];
 
+/// The size that an answer to an initiate upload indicates, if it contains the data.
+pub(super) fn expedited_size(answer: &Frame) -> Option<usize> {
+    match answer.data().first() {
+        Some(command @ (0x43 | 0x47 | 0x4b | 0x4f)) => Some(4 - usize::from(command >> 2 & 0b11)),
+        _ => None,
+    }
+}
+
 /// An SDO abort with one of these codes is expected.
 pub(super) fn expect_abort(
     session: &Session<'_, '_>,

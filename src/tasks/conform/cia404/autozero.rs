@@ -72,7 +72,7 @@ fn wrong_signature(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 }
 
 /// An autozero that was executed.
-struct AutozeroReport {
+struct ExecutedAutozero {
     objects: Objects,
     before: Readings,
     after: Readings,
@@ -82,7 +82,7 @@ struct AutozeroReport {
 }
 
 /// Writes the signature. The verdict if nothing can be judged.
-fn autozero(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Result<AutozeroReport, Verdict>, Error> {
+fn autozero(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Result<ExecutedAutozero, Verdict>, Error> {
     let objects = match objects(session, channel)? {
         Ok(objects) => objects,
         Err(verdict) => return Ok(Err(verdict)),
@@ -114,7 +114,7 @@ fn autozero(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Result<A
     if shift.abs() <= 2.0 * tolerance {
         return Ok(Err(Verdict::not_judged(WhyNot::NearZero(value))));
     }
-    Ok(Ok(AutozeroReport { objects, before, after, offset_before, offset_after, tolerance }))
+    Ok(Ok(ExecutedAutozero { objects, before, after, offset_before, offset_after, tolerance }))
 }
 
 fn zero(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
@@ -123,10 +123,8 @@ fn zero(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
             Ok(zeroed) => zeroed,
             Err(verdict) => return Ok(verdict),
         };
-        let seen = zeroed.after.middle();
-        let expected = Expected::Measured { value: 0.0, tolerance: zeroed.tolerance };
-        let finding = || Finding::at(channel.values[0].0, expected, Seen::Measured(seen));
-        Ok(Verdict::of((seen.abs() > zeroed.tolerance).then(finding)))
+        let (value, _) = channel.values[0];
+        Ok(Verdict::of(Finding::measured(value, 0.0, zeroed.tolerance, zeroed.after.middle())))
     })
 }
 
@@ -136,12 +134,10 @@ fn offset(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
             Ok(zeroed) => zeroed,
             Err(verdict) => return Ok(verdict),
         };
-        let AutozeroReport { objects, before, after, offset_before, offset_after, tolerance } = zeroed;
-        let value = offset_before + after.middle() - before.middle();
-        let expected = Expected::Measured { value, tolerance };
-        let finding = || Finding::at(objects.offset, expected, Seen::Measured(offset_after));
+        let ExecutedAutozero { objects, before, after, offset_before, offset_after, tolerance } = zeroed;
         // 404-51 reports a process value that is not zero.
-        Ok(Verdict::of(((offset_after - value).abs() > tolerance).then(finding)))
+        let expected = offset_before + after.middle() - before.middle();
+        Ok(Verdict::of(Finding::measured(objects.offset, expected, tolerance, offset_after)))
     })
 }
 
@@ -168,8 +164,6 @@ fn undone(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
             return Ok(Verdict::not_judged(WhyNot::NoValidValue(value)));
         };
         let tolerance = zeroed.tolerance + zeroed.before.allowance(now);
-        let is_wrong = (now.middle() - zeroed.before.middle()).abs() > tolerance;
-        let expected = Expected::Measured { value: zeroed.before.middle(), tolerance };
-        Ok(Verdict::of(is_wrong.then(|| Finding::at(value, expected, Seen::Measured(now.middle())))))
+        Ok(Verdict::of(Finding::measured(value, zeroed.before.middle(), tolerance, now.middle())))
     })
 }

@@ -69,9 +69,8 @@ fn process_value(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
             let expected = old.middle();
             let steps = step(data_type, change.from) + step(data_type, change.to);
             let tolerance = old.allowance(new) + steps;
-            if (new.middle() - expected).abs() > tolerance {
-                let expected = Expected::Measured { value: expected, tolerance };
-                findings.push(Finding::at(object, expected, Seen::Measured(new.middle())));
+            if let Some(finding) = Finding::measured(object, expected, tolerance, new.middle()) {
+                findings.push(finding);
             } else if 0.9 * expected.abs() > tolerance {
                 is_judged = true;
             } else {
@@ -99,10 +98,7 @@ fn undone(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
             let Some(new) = after.iter().find(|new| new.object == old.object) else { continue };
             let data_type = session.node.data_type(old.object);
             let tolerance = old.rounding + rounding(data_type, change.to, old.value);
-            if (new.value - old.value).abs() > tolerance {
-                let expected = Expected::Measured { value: old.value, tolerance };
-                findings.push(Finding::at(old.object, expected, Seen::Measured(new.value)));
-            }
+            findings.extend(Finding::measured(old.object, old.value, tolerance, new.value));
         }
         Ok(Verdict::of(findings))
     })

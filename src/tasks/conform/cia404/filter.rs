@@ -2,7 +2,7 @@
 
 use super::super::case::{Area, Case, Run, Severity::*};
 use super::super::codes;
-use super::super::finding::{Expected, Finding, Seen, Verdict, WhyNot};
+use super::super::finding::{Finding, Verdict, WhyNot};
 use super::super::sdo::expect_abort;
 use super::super::session::Session;
 use super::{Channel, check_channels, rounding};
@@ -95,10 +95,7 @@ fn mean_of(session: &mut Session<'_, '_>, channel: &Channel) -> Result<Verdict, 
         let expected = f64::midpoint(low, high);
         let tolerance =
             (high - low) + before.allowance(after) + 2.0 * (filtered.spread() + rounding(data_type, digits, expected));
-        if (filtered.middle() - expected).abs() > tolerance {
-            let expected = Expected::Measured { value: expected, tolerance };
-            findings.push(Finding::at(value, expected, Seen::Measured(filtered.middle())));
-        }
+        findings.extend(Finding::measured(value, expected, tolerance, filtered.middle()));
     }
     Ok(if is_judged { Verdict::of(findings) } else { Verdict::NotApplicable(WhyNot::NotWritable(kind)) })
 }

@@ -110,9 +110,8 @@ fn process_value_of(session: &mut Session<'_, '_>, channel: &Channel) -> Result<
         let steps = rounding(data_type, digits, expected)
             .max(converted_rounding(change, rounding(data_type, digits, old.middle())));
         let tolerance = converted.allowance(new) + 2.0 * steps;
-        let seen = new.middle();
-        if (seen - expected).abs() > tolerance {
-            findings.push(Finding::at(object, Expected::Measured { value: expected, tolerance }, Seen::Measured(seen)));
+        if let Some(finding) = Finding::measured(object, expected, tolerance, new.middle()) {
+            findings.push(finding);
         } else if (old.middle() - expected).abs() > tolerance {
             is_judged = true;
         } else {
@@ -145,10 +144,7 @@ fn settings(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
             let new = after.iter().find(|new| new.object == old.object);
             let (Some(expected), Some(new)) = (converted, new) else { continue };
             let tolerance = new.rounding + converted_rounding(change, old.rounding) + 0.002 * expected.abs();
-            if (new.value - expected).abs() > tolerance {
-                let expected = Expected::Measured { value: expected, tolerance };
-                findings.push(Finding::at(old.object, expected, Seen::Measured(new.value)));
-            }
+            findings.extend(Finding::measured(old.object, expected, tolerance, new.value));
         }
         Ok(Verdict::of(findings))
     })
@@ -172,10 +168,7 @@ fn undone(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
             let find = |list: &[Number]| list.iter().find(|number| number.object == old.object).copied();
             let (Some(between), Some(new)) = (find(&between), find(&after)) else { continue };
             let tolerance = old.rounding + converted_rounding(back, between.rounding) + 1e-5 * old.value.abs();
-            if (new.value - old.value).abs() > tolerance {
-                let expected = Expected::Measured { value: old.value, tolerance };
-                findings.push(Finding::at(old.object, expected, Seen::Measured(new.value)));
-            }
+            findings.extend(Finding::measured(old.object, old.value, tolerance, new.value));
         }
         Ok(Verdict::of(findings))
     })

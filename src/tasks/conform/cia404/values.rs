@@ -125,10 +125,7 @@ fn equal_values_of(session: &mut Session<'_, '_>, channel: &Channel) -> Result<V
         is_judged = true;
         let [expected, seen] = sums.map(|sum| sum / f64::from(count));
         let errors = rounding(reference.1, digits, expected) + rounding(data_type, digits, seen);
-        if (expected - seen).abs() > errors + (high - low) {
-            let near = Expected::Measured { value: expected, tolerance: errors + (high - low) };
-            findings.push(Finding::at(object, near, Seen::Measured(seen)));
-        }
+        findings.extend(Finding::measured(object, expected, errors + (high - low), seen));
     }
     Ok(match (is_judged, others.is_empty()) {
         (_, true) => NO_OBJECT,
@@ -200,10 +197,7 @@ fn span(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
         }
         for (first, other) in others.iter().flat_map(|[low, high]| [(start, low), (end, high)]) {
             let tolerance = first.rounding + other.rounding;
-            if (first.value - other.value).abs() > tolerance {
-                let expected = Expected::Measured { value: first.value, tolerance };
-                findings.push(Finding::at(other.object, expected, Seen::Measured(other.value)));
-            }
+            findings.extend(Finding::measured(other.object, first.value, tolerance, other.value));
         }
         Ok(Verdict::of(findings))
     })

@@ -3,7 +3,7 @@
 use super::super::codes;
 use super::super::finding::{Expected, Finding, Seen, Verdict, WhyNot, abort_code};
 use super::super::od::{counts_entries, entry, exists};
-use super::super::sdo::expect_abort;
+use super::super::sdo::{expect_abort, expedited_size};
 use super::super::session::Session;
 use super::super::settings::may_write;
 use super::{MANDATORY, NO_FILE, entries, file, is_measuring, is_setting, starts_action};
@@ -75,9 +75,8 @@ pub(super) fn are_listed(session: &mut Session<'_, '_>) -> Result<Verdict, Error
 /// The size that an answer to an initiate upload indicates.
 fn indicated_size(frame: &Frame) -> Option<usize> {
     match frame.data() {
-        [command @ (0x43 | 0x47 | 0x4b | 0x4f), ..] => Some(4 - usize::from(command >> 2 & 0b11)),
         [0x41, _, _, _, a, b, c, d] => usize::try_from(u32::from_le_bytes([*a, *b, *c, *d])).ok(),
-        _ => None,
+        _ => expedited_size(frame),
     }
 }
 

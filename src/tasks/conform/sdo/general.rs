@@ -3,7 +3,7 @@
 use super::super::case::{Area, Case, Run, Severity::*};
 use super::super::finding::{Expected, Finding, Seen, Verdict, WhyNot};
 use super::super::session::{Session, request};
-use super::{ABORT, MISSING, narrow_setting, unchanged};
+use super::{ABORT, MISSING, expedited_size, narrow_setting, unchanged};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
@@ -49,10 +49,7 @@ fn padding(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let mut findings = Vec::new();
     for object in [ObjectId::new(0x1001, 0), ObjectId::new(0x1018, 0)] {
         let Some(answer) = session.upload(object)? else { continue };
-        let used = match answer.data().first() {
-            Some(command @ (0x4f | 0x4b | 0x47)) => 4 - usize::from(command >> 2 & 0b11),
-            _ => continue,
-        };
+        let Some(used) = expedited_size(&answer) else { continue };
         if answer.data().get(4 + used..).unwrap_or_default().iter().any(|&byte| byte != 0) {
             findings.push(Finding::at(object, Expected::ZeroPadding, Seen::Frame(answer)));
         }
