@@ -24,8 +24,8 @@ use stimulus::StimulusCommand;
 /// the standard. It prints a verdict for each case: pass, deviates, not-judged or not-applicable. A deviation that the
 /// manual of the device documents is reported as known. The cases of the area "timing" print measured times and no verdict.
 ///
-/// The device should be alone on the bus. If other nodes or other traffic are seen, only one area can be checked
-/// (--only). The command writes only objects of 1000h to 1FFFh and settings of the device profile. Afterwards all
+/// The device should be alone on the bus. If other nodes or other traffic are seen, only the areas can be checked that
+/// send nothing to other nodes: --only with all areas except pdo and lss. The command writes only objects of 1000h to 1FFFh and settings of the device profile. Afterwards all
 /// settings and the NMT state are as before. With --store, the command also stores settings, restores factory
 /// defaults, sets the present node-ID by LSS, and executes and undoes autozero. At the end it stores the settings that
 /// the device had at the start.
@@ -60,7 +60,7 @@ Areas:
 
 Examples:
   cangauge -b sim:mh4@1 conform 1
-  cangauge -b sim:mh4@1 conform 1 --only sdo --skip SDO-22
+  cangauge -b sim:mh4@1 conform 1 --only sdo,nmt --skip SDO-22
   cangauge -b sim:mh4@1 conform 1 --report new.html --report new.json
   cangauge conform 5 --eds sensor.eds --report new.html
   cangauge conform 5 --only 404 --stimulus ./pressure.sh
@@ -73,11 +73,11 @@ pub(crate) struct Conform {
     /// Node-ID: 5, 0x7f
     #[arg(value_parser = parse_node, required = true)]
     node: Option<NodeId>,
-    /// Run only the cases of this area
-    #[arg(long, value_name = "AREA", value_parser = PossibleValuesParser::new(Area::ALL.map(Area::name)).try_map(|text| text.parse::<Area>()))]
-    only: Option<Area>,
-    /// Do not run this case: SDO-07. Can be repeated
-    #[arg(long, value_name = "CASE", value_parser = parse_case)]
+    /// Run only the cases of these areas: sdo,nmt. Can be repeated
+    #[arg(long, value_name = "AREA", value_delimiter = ',', value_parser = PossibleValuesParser::new(Area::ALL.map(Area::name)).try_map(|text| text.parse::<Area>()))]
+    only: Vec<Area>,
+    /// Do not run these cases: SDO-07,SDO-22. Can be repeated
+    #[arg(long, value_name = "CASE", value_delimiter = ',', value_parser = parse_case)]
     skip: Vec<String>,
     /// Also run the cases that write to non-volatile memory, set the node-ID or execute autozero
     #[arg(long)]
@@ -182,7 +182,7 @@ impl Conform {
 
     fn check(&self, global: &Global, node: NodeId) -> anyhow::Result<()> {
         let eds = descriptions::file_of(global, node)?.map(Arc::new);
-        let options = ConformOptions { only: self.only, skip: self.skip.clone(), store: self.store, eds };
+        let options = ConformOptions { only: self.only.clone(), skip: self.skip.clone(), store: self.store, eds };
         if self.dry_run {
             return global.print(&options.selected().map(CaseRow).collect::<Vec<_>>());
         }

@@ -37,9 +37,30 @@ fn other_nodes_are_a_reason_to_refuse() {
     assert_eq!(
         done.stderr,
         "cangauge: node 1: node 127 is on the bus, too: nothing was changed\n\
-         hint: disconnect them, or check only one area: cangauge conform 1 --only sdo\n"
+         hint: disconnect them, or check only areas without pdo and lss: cangauge conform 1 --only sdo,nmt\n"
     );
-    bench.run("conform 1 --only sdo").exit(0);
+    bench.run("conform 1 --only sdo,nmt").exit(0);
+    bench.run("conform 1 --only sdo,pdo").exit(1);
+}
+
+#[test]
+fn several_areas_and_cases_are_selected() {
+    let bench = Bench::of("mh4@1");
+    let cases = |options: &str| {
+        let rows = bench.run(&format!("conform 1 {options} --dry-run --format json")).exit(0).json();
+        rows.iter().map(|row| row["case"].as_str().expect("a case").to_owned()).collect::<Vec<_>>()
+    };
+    let areas = |options: &str| -> Vec<String> {
+        let mut areas: Vec<String> = cases(options).iter().map(|case| case[..3].to_owned()).collect();
+        areas.dedup();
+        areas
+    };
+    assert_eq!(areas("--only nmt,sdo"), ["SDO", "NMT"]);
+    assert_eq!(areas("--only sdo --only nmt"), ["SDO", "NMT"]);
+    let skipped = cases("--only nmt --skip NMT-01,nmt-02 --skip NMT-04");
+    assert_eq!(skipped[..2], ["NMT-03", "NMT-05"]);
+    bench.run("conform 1 --only sdo,everything").exit(2);
+    bench.run("conform 1 --skip SDO-01,SDO-99").exit(2);
 }
 
 #[test]

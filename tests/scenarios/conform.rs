@@ -190,7 +190,7 @@ fn measured_times_are_those_of_the_device() {
             frame.id().number() == 0x605 && memory.count % 10 == 0
         })),
     );
-    let options = ConformOptions { only: Some(Area::Timing), ..ConformOptions::default() };
+    let options = ConformOptions { only: vec![Area::Timing], ..ConformOptions::default() };
     let figure = |report: &ConformReport, id: &str, wanted: Statistic| {
         let result = report.results.iter().find(|result| result.case.id == id).expect("the case");
         let Verdict::Measured(figures) = &result.verdict else { panic!("{id}: {:?}", result.verdict) };
@@ -226,7 +226,7 @@ fn other_nodes_are_a_reason_to_refuse() {
     assert_eq!(failure.kind(), Kind::CheckFailed);
     let message = ErrorMessage::of(&failure).message;
     assert_eq!(message, "node 5: node 9 is on the bus, too: nothing was changed");
-    let only = ConformOptions { only: Some(Area::Sdo), ..ConformOptions::default() };
+    let only = ConformOptions { only: vec![Area::Sdo], ..ConformOptions::default() };
     let report = run(&mut bus, "mh4", &only).expect("only SDO");
     let alone = report.results.iter().find(|result| result.case.id == "SDO-24").expect("the case");
     assert!(matches!(alone.verdict, Verdict::NotApplicable(_)), "{:?}", alone.verdict);
@@ -320,7 +320,7 @@ const SEARCH: usize = 260;
 /// Interrupts the cases of an area after each `step`th frame. Returns what is not as before.
 fn interrupted(kind: &str, area: Area, store: bool, step: impl Fn(usize) -> usize) -> Vec<String> {
     let file = (area == Area::Eds).then(|| eds(kind, &[]));
-    let options = ConformOptions { only: Some(area), store, eds: file, ..ConformOptions::default() };
+    let options = ConformOptions { only: vec![area], store, eds: file, ..ConformOptions::default() };
     let mut clean = FaultyBus::new(bus(kind, None), Fault::None, 0);
     let before = contents(&mut clean.bus);
     run(&mut clean, kind, &options).expect("a report");

@@ -25,8 +25,9 @@ pub(super) fn words(failure: &Failure, cause: &ConformFailure) -> CauseText {
                     format!("nodes {} are on the bus, too", several.join(", "))
                 }
             };
-            CauseText::new(format!("{seen}: nothing was changed"))
-                .hint(format!("disconnect them, or check only one area: cangauge conform {node} --only sdo"))
+            CauseText::new(format!("{seen}: nothing was changed")).hint(format!(
+                "disconnect them, or check only areas without pdo and lss: cangauge conform {node} --only sdo,nmt"
+            ))
         }
     }
 }

@@ -66,8 +66,8 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
 /// What to check.
 #[derive(Clone, Debug, Default)]
 pub struct ConformOptions {
-    /// Run only the cases of this area.
-    pub only: Option<Area>,
+    /// Run only the cases of these areas. All areas if empty.
+    pub only: Vec<Area>,
     /// The numbers of cases that are not run.
     pub skip: Vec<String>,
     /// Also run the cases that store settings, set the node-ID, or write a signature.
@@ -80,7 +80,7 @@ impl ConformOptions {
     /// The cases to run.
     pub fn selected(&self) -> impl Iterator<Item = &'static Case> + '_ {
         cases()
-            .filter(|case| self.only.is_none_or(|area| case.area == area))
+            .filter(|case| self.only.is_empty() || self.only.contains(&case.area))
             .filter(|case| !self.skip.iter().any(|id| id == case.id))
     }
 }
@@ -159,7 +159,7 @@ pub fn conform(
     let is_local = options.selected().all(|case| case.area.is_local());
     let is_alone = match alone::others(master, &node)? {
         None => true,
-        Some(_) if is_local && options.only.is_some() => false,
+        Some(_) if is_local && !options.only.is_empty() => false,
         Some(failure) => return Err(Failure::at(id, failure)),
     };
     if let Some(before) = &before {
