@@ -37,7 +37,8 @@ use stimulus::StimulusCommand;
 /// A failure of CMD, or no end within 60 s, is reported as not-judged. CMD is always run with "normal" at the end.
 ///
 /// Some cases reset the device. Without --store, settings in 2000h to 5FFFh that were not stored are then lost. They are
-/// listed as "not restored" if the object dictionary of the device is known.
+/// listed as "not restored" if the object dictionary of the device is known. If the error history (1003h) is not as
+/// before, the last line shows it.
 ///
 /// The exit code is 0 if there is no deviation, or only known ones, and 1 if there is a deviation.
 #[derive(Debug, Args)]

@@ -150,6 +150,7 @@ pub fn left(report: &ConformReport) -> Option<String> {
         .then(objects)
         .into_iter()
         .chain((report.state == StateAfter::Unknown).then(state))
+        .chain(report.history.as_ref().map(super::failure::conform::history_left))
         .chain(report.input_failure.as_ref().map(super::failure::conform::input_left))
         .collect();
     (!left.is_empty()).then(|| left.join("; "))

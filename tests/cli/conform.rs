@@ -164,6 +164,31 @@ fn reports_are_written_and_compared() {
 }
 
 #[test]
+fn error_during_the_check_is_named_at_the_end() {
+    let bench = Bench::described(
+        "[[device]]\nkind = \"mh4\"\nnode = 1\n[[device.overload]]\nchannel = 1\nfrom = \"2.5s\"\nuntil = \"2.6s\"\n\
+         direction = \"high\"\n",
+    );
+    let path = bench.path("r.json").display().to_string();
+    let done = bench.run(&format!("conform 1 --only sdo --report {path}")).exit(0);
+    let history = "node 1: the error history (0x1003) has 1 entry (0 before), the newest is 0x0103F001\n";
+    assert!(done.stderr.ends_with(history), "{}", done.stderr);
+    let text = std::fs::read_to_string(&path).expect("the file");
+    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(report["error_history"], json!({ "before": 0, "after": 1, "newest": 0x0103_f001 }));
+}
+
+#[test]
+fn life_guarding_of_the_device_is_not_started() {
+    let bench =
+        Bench::described("[[device]]\nkind = \"mc1609\"\nnode = 1\nset = { \"0x100C\" = 100, \"0x100D\" = 3 }\n");
+    let done = bench.run("conform 1 --only error-control").exit(0);
+    let reason = "        not run, because life guarding is on (0x100C and 0x100D are not 0)\n";
+    assert_eq!(done.stdout.matches(reason).count(), 4, "{}", done.stdout);
+    assert!(!done.frames.iter().any(|frame| frame.contains("081#3081")), "{:?}", done.frames);
+}
+
+#[test]
 fn stimulus_is_run_for_each_input_and_for_the_normal_one_at_the_end() {
     let bench = Bench::of("mh4@1");
     let log = bench.path("inputs").display().to_string();

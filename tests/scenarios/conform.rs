@@ -26,6 +26,8 @@ use cangauge::tasks::{Failure, Kind};
 use deviant::{Deviant, Deviation, NODE, Switch};
 use eds_text::eds_text;
 use std::collections::{BTreeMap, BTreeSet};
+use std::iter::StepBy;
+use std::ops::Range;
 use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
@@ -132,7 +134,7 @@ fn simulated_devices_have_only_the_deviations_of_their_manuals() {
         assert_eq!(deviations(&report), [], "{kind}");
         let found = report.results.iter().filter_map(|result| Some((result.case.id, result.known.as_deref()?)));
         assert_eq!(found.collect::<Vec<_>>(), expected, "{kind}");
-        assert_eq!(report.not_restored, [], "{kind}");
+        assert_eq!((report.not_restored, report.history), (vec![], None), "{kind}");
         let is_pass = |id: &&str| report.results.iter().any(|one| one.case.id == *id && one.verdict.name() == "pass");
         let overloads = ["404-70", "404-71", "404-72", "404-73", "404-74"].into_iter().filter(is_pass);
         let shown: &[&str] = match kind {
@@ -239,7 +241,8 @@ fn an_interrupted_check_restores_the_device() {
     for area in Area::ALL {
         for kind in ["mh4", "d20", "mc1609", "dps"] {
             let step = if kind == "mh4" { 9 } else { 83 };
-            let wrong = interrupted(kind, area, area == Area::Eds, |count| step.max(count / 60));
+            let wrong =
+                interrupted(kind, area, area == Area::Eds, |count| (SEARCH..count).step_by(step.max(count / 60)));
             assert_eq!(wrong, [""; 0]);
         }
     }
@@ -247,7 +250,14 @@ fn an_interrupted_check_restores_the_device() {
 
 #[test]
 fn late_answer_to_an_interrupted_write_leaves_no_setting_unrestored() {
-    assert_eq!(interrupted("dps", Area::Emcy, false, |_| 1), [""; 0]);
+    assert_eq!(interrupted("dps", Area::Emcy, false, each), [""; 0]);
+}
+
+#[test]
+fn interrupted_life_guarding_leaves_no_error() {
+    // The last case but one sets the life time.
+    let last = |count: usize| (count - 100..count).step_by(1);
+    assert_eq!(interrupted("mc1609", Area::ErrorControl, false, last), [""; 0]);
 }
 
 /// Ctrl-C after each frame. One test for each device, so that they run in parallel.
@@ -255,7 +265,7 @@ mod every_frame {
     use super::*;
 
     fn all_areas(kind: &str, store: bool) {
-        let wrong: Vec<String> = Area::ALL.into_iter().flat_map(|area| interrupted(kind, area, store, |_| 1)).collect();
+        let wrong: Vec<String> = Area::ALL.into_iter().flat_map(|area| interrupted(kind, area, store, each)).collect();
         assert_eq!(wrong, [""; 0]);
     }
 
@@ -317,8 +327,15 @@ fn run_on(bus: &mut MemoryBus) {
 /// The first frames search the bus for other nodes.
 const SEARCH: usize = 260;
 
-/// Interrupts the cases of an area after each `step`th frame. Returns what is not as before.
-fn interrupted(kind: &str, area: Area, store: bool, step: impl Fn(usize) -> usize) -> Vec<String> {
+/// The numbers of frames after which a check is interrupted.
+type FrameNumbers = StepBy<Range<usize>>;
+
+fn each(count: usize) -> FrameNumbers {
+    (SEARCH..count).step_by(1)
+}
+
+/// Interrupts the cases of an area after the chosen ones of all frames. Returns what is not as before.
+fn interrupted(kind: &str, area: Area, store: bool, chosen: impl Fn(usize) -> FrameNumbers) -> Vec<String> {
     let file = (area == Area::Eds).then(|| eds(kind, &[]));
     let options = ConformOptions { only: vec![area], store, eds: file, ..ConformOptions::default() };
     let mut clean = FaultyBus::new(bus(kind, None), Fault::None, 0);
@@ -326,7 +343,7 @@ fn interrupted(kind: &str, area: Area, store: bool, step: impl Fn(usize) -> usiz
     run(&mut clean, kind, &options).expect("a report");
     let count = clean.sent.len();
     let mut wrong = Vec::new();
-    for at in (SEARCH..count).step_by(step(count)) {
+    for at in chosen(count) {
         let mut faulty = FaultyBus::new(bus(kind, None), Fault::Interrupt, at);
         let result = run(&mut faulty, kind, &options);
         let mut bus = faulty.bus;
@@ -336,7 +353,10 @@ fn interrupted(kind: &str, area: Area, store: bool, step: impl Fn(usize) -> usiz
         run_on(&mut bus);
         found.extend(differences(&mut bus, &before).into_iter().map(|one| format!("after a power cycle: {one}")));
         match result {
-            Ok(report) => found.extend(report.not_restored.iter().map(|object| format!("not restored: {object}"))),
+            Ok(report) => {
+                found.extend(report.not_restored.iter().map(|object| format!("not restored: {object}")));
+                found.extend(report.history.map(|change| format!("{change:?}")));
+            }
             Err(failure) if failure.kind() == Kind::Interrupted && failure.effects.is_empty() => {}
             Err(failure) => found.push(format!("{failure}: {:?}", failure.effects)),
         }

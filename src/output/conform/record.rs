@@ -48,6 +48,11 @@ impl ConformRecord<'_> {
             "serial": node.identity.serial,
             "seconds": report.length.as_secs_f64(),
             "not_restored": report.not_restored.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            "error_history": report.history.map(|change| json!({
+                "before": change.before.count,
+                "after": change.after.count,
+                "newest": change.after.newest,
+            })),
             "cases": report.results.iter().map(case).collect::<Vec<_>>(),
         });
         format!("{record:#}\n")

@@ -161,6 +161,7 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::NotWritable(object) => format!("{object} cannot be changed"),
         WhyNot::NoState => "the node shows no NMT state: it has no heartbeat (0x1017:0)".to_owned(),
         WhyNot::NoGuarding => "the device does not answer node guarding".to_owned(),
+        WhyNot::LifeGuarding => "not run, because life guarding is on (0x100C and 0x100D are not 0)".to_owned(),
         WhyNot::ErrorHistory => "not run, because the error history (0x1003) is not empty".to_owned(),
         WhyNot::NoTpdo => "the device has no TPDO with a mapping and this transmission type".to_owned(),
         WhyNot::NoEventTimer => "the device has no event timer".to_owned(),

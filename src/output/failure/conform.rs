@@ -5,7 +5,7 @@ use crate::canopen::object::ObjectId;
 use crate::output::conform::stimulus_failure;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
-use crate::tasks::conform::{ConformEffect, ConformFailure, Input, StimulusFailure};
+use crate::tasks::conform::{ConformEffect, ConformFailure, HistoryChange, Input, StimulusFailure};
 
 /// The message and the hint for a cause.
 pub(super) fn words(failure: &Failure, cause: &ConformFailure) -> CauseText {
@@ -42,8 +42,17 @@ pub(in crate::output) fn effect(node: &str, effect: &ConformEffect) -> NoteText 
         ConformEffect::Unknown => {
             NoteText::new("not-restored", "the settings could not be restored").command("undo", undo)
         }
+        ConformEffect::HistoryChanged(change) => NoteText::new("error-history", history_left(change)),
         ConformEffect::InputNotNormal(reason) => NoteText::new("input-not-normal", input_left(reason)),
     }
+}
+
+/// The error history is not as before.
+pub(in crate::output) fn history_left(change: &HistoryChange) -> String {
+    let (before, after) = (change.before.count, change.after.count);
+    let entries = if after == 1 { "1 entry".to_owned() } else { format!("{after} entries") };
+    let newest = change.after.newest.map(|entry| format!(", the newest is 0x{entry:08X}")).unwrap_or_default();
+    format!("the error history (0x1003) has {entries} ({before} before){newest}")
 }
 
 /// The input of the device is not as before.

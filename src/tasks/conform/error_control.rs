@@ -143,8 +143,8 @@ fn form(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     Ok(Verdict::of(wrong.map(|received| Finding::new(Expected::OneByte, Seen::Frame(received.frame)))))
 }
 
-const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
-const LIFE_TIME_FACTOR: ObjectId = ObjectId::new(0x100d, 0);
+pub(super) const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
+pub(super) const LIFE_TIME_FACTOR: ObjectId = ObjectId::new(0x100d, 0);
 
 /// Sends a guarding request. Returns the answer.
 fn guard(session: &mut Session<'_, '_>) -> Result<Option<Frame>, Error> {
@@ -169,8 +169,12 @@ fn prepare_guarding(session: &mut Session<'_, '_>) -> Result<Option<Verdict>, Er
     if !session.master.bus().sends_remote_frames() {
         return Ok(Some(Verdict::NotApplicable(WhyNot::NoRemoteFrames)));
     }
-    if session.number(GUARD_TIME)?.is_none() {
+    let Some(guard_time) = session.number(GUARD_TIME)? else {
         return Ok(Some(Verdict::NotApplicable(WhyNot::NoObject(GUARD_TIME))));
+    };
+    // The first request starts life guarding, which fails after the check.
+    if guard_time > 0 && session.number(LIFE_TIME_FACTOR)?.is_some_and(|factor| factor > 0) {
+        return Ok(Some(Verdict::not_judged(WhyNot::LifeGuarding)));
     }
     set_period(session, Duration::ZERO)?;
     session.pause(PERIOD)?;
@@ -230,13 +234,14 @@ fn life_time(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     if session.number(LIFE_TIME_FACTOR)?.is_none() {
         return Ok(Verdict::NotApplicable(WhyNot::NoObject(LIFE_TIME_FACTOR)));
     }
+    // An earlier guarding request may have started life guarding. It then fails with the first life time.
+    if !session.may_cause_error()? {
+        return Ok(Verdict::not_judged(WhyNot::ErrorHistory));
+    }
     if session.try_write(GUARD_TIME, &100u16.to_le_bytes())?.is_some()
         || session.try_write(LIFE_TIME_FACTOR, &[3])?.is_some()
     {
         return Ok(Verdict::NotApplicable(WhyNot::NotWritable(GUARD_TIME)));
-    }
-    if !session.may_cause_error()? {
-        return Ok(Verdict::not_judged(WhyNot::ErrorHistory));
     }
     session.command(NmtCommand::Start)?;
     if guard(session)?.is_none() {

@@ -1,5 +1,6 @@
 //! Why a check of a device was refused or ended early.
 
+use super::history::HistoryChange;
 use super::stimulus::StimulusFailure;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
@@ -37,6 +38,8 @@ pub enum ConformEffect {
     NotRestored(Vec<ObjectId>),
     /// The settings could not be read back.
     Unknown,
+    /// The error history is not as before.
+    HistoryChanged(HistoryChange),
     /// The input of the device may not be as before.
     InputNotNormal(StimulusFailure),
 }

@@ -194,6 +194,8 @@ pub enum WhyNot {
     NoState,
     /// The device does not answer node guarding.
     NoGuarding,
+    /// Life guarding is on: guard time and life time factor are not 0.
+    LifeGuarding,
     /// The error history has entries, which the case would change.
     ErrorHistory,
     /// The device has no TPDO with a mapping and this transmission type.

@@ -13,6 +13,7 @@ mod error_control;
 mod failure;
 mod figure;
 mod finding;
+mod history;
 mod lss;
 mod nmt;
 mod od;
@@ -28,6 +29,7 @@ pub use case::{Area, Case, Needs, Severity};
 pub use failure::{ConformEffect, ConformFailure};
 pub use figure::{Figure, Statistic};
 pub use finding::{Expected, Finding, Seen, Verdict, WhyNot};
+pub use history::{ErrorEntries, HistoryChange};
 pub use stimulus::{Input, Stimulus, StimulusFailure};
 
 use crate::bus::{Filters, Stamp};
@@ -133,6 +135,8 @@ pub struct ConformReport {
     pub results: Vec<CaseResult>,
     /// Settings that do not have the values from before.
     pub not_restored: Vec<ObjectId>,
+    /// The error history, if it is not as before.
+    pub history: Option<HistoryChange>,
     /// The NMT state.
     pub state: StateAfter,
     /// Why the input of the device may not be as before.
@@ -173,25 +177,29 @@ pub fn conform(
     let run = session.begin().map_err(Failure::from).and_then(|()| session.run(options, observe));
     session.is_answer_open |= run.is_err();
     let restored = session.restore();
+    let history = session.history_change();
     let state = session.restore_state();
     let length = session.master.now().since(started.mono);
     if restored.as_ref().is_ok_and(Vec::is_empty) {
         journal.finish();
     }
     let Session { node, input_failure, .. } = session;
+    let (history, state) = match history {
+        Ok(history) => (history, state),
+        Err(error) => (None, state.and(Err(error))),
+    };
     let failure = match (run, restored, state) {
         (Ok(results), Ok(not_restored), Ok(state)) => {
-            return Ok(ConformReport { node, started, length, results, not_restored, state, input_failure });
+            return Ok(ConformReport { node, started, length, results, not_restored, history, state, input_failure });
         }
         (Ok(_), Err(error), _) | (Ok(_), Ok(_), Err(error)) => Failure::from(error).with(id, ConformEffect::Unknown),
         (Err(failure), Ok(objects), _) if objects.is_empty() => failure,
         (Err(failure), Ok(objects), _) => failure.with(id, ConformEffect::NotRestored(objects)),
         (Err(failure), Err(_), _) => failure.with(id, ConformEffect::Unknown),
     };
-    Err(match input_failure {
-        Some(reason) => failure.with(id, ConformEffect::InputNotNormal(reason)),
-        None => failure,
-    })
+    let of_history = history.map(ConformEffect::HistoryChanged);
+    let effects = of_history.into_iter().chain(input_failure.map(ConformEffect::InputNotNormal));
+    Err(effects.fold(failure, |failure, effect| failure.with(id, effect)))
 }
 
 /// Reads the node and its settings. If the settings cannot be read in the form of a file, there is no journal.

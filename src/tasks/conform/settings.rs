@@ -1,5 +1,7 @@
 //! The settings of the node before the first case, and how they are restored.
 
+use super::error_control::{GUARD_TIME, LIFE_TIME_FACTOR};
+use super::history::ErrorEntries;
 use super::session::{SETTLE, Session, number};
 use crate::canopen::frame::Frame;
 use crate::canopen::nmt::NmtCommand;
@@ -40,6 +42,8 @@ pub(super) struct Settings {
     changed: BTreeSet<ObjectId>,
     /// Settings that the program must not write. They are lost at a reset, if they were not stored.
     protected: BTreeSet<ObjectId>,
+    /// The error history before the first case; `None` if the device has none.
+    pub(super) history: Option<ErrorEntries>,
 }
 
 impl Settings {
@@ -102,11 +106,17 @@ impl Session<'_, '_> {
                 }
             }
         }
+        self.settings.history = self.error_entries()?;
         // An empty error history can be restored: 0 deletes its entries.
         if let Some(empty) = self.read_or_skip(ERROR_COUNT)?.filter(|count| number(count) == 0) {
             self.settings.before.insert(ERROR_COUNT, empty);
         }
         Ok(())
+    }
+
+    /// Reads a number of at most eight bytes; `None` without a valid answer.
+    pub(super) fn number_or_skip(&mut self, object: ObjectId) -> Result<Option<u64>, Error> {
+        Ok(self.read_or_skip(object)?.filter(|bytes| bytes.len() <= 8).map(|bytes| number(&bytes)))
     }
 
     /// Reads an object; `None` without a valid answer.
@@ -166,13 +176,18 @@ impl Session<'_, '_> {
     /// Restores the settings that the case has changed, also after Ctrl-C. Returns the settings that have another value
     /// then.
     pub(super) fn restore(&mut self) -> Result<Vec<ObjectId>, Error> {
-        let mut result = self.restore_once();
+        self.despite_interrupts(Self::restore_once)
+    }
+
+    /// Repeats an action that Ctrl-C has ended.
+    pub(super) fn despite_interrupts<T>(&mut self, act: impl Fn(&mut Self) -> Result<T, Error>) -> Result<T, Error> {
+        let mut result = act(self);
         for _ in 0..MAX_INTERRUPTS {
             if !matches!(result, Err(Error::Interrupted)) {
                 break;
             }
             self.is_answer_open = true;
-            result = self.restore_once();
+            result = act(self);
         }
         result
     }
@@ -191,6 +206,9 @@ impl Session<'_, '_> {
         self.wake_up()?;
         self.end_transfer()?;
         if std::mem::take(&mut self.guarded) {
+            // Life guarding is off before the last request. It cannot fail again.
+            self.put_back(GUARD_TIME)?;
+            self.put_back(LIFE_TIME_FACTOR)?;
             self.end_guarding_error()?;
         }
         if std::mem::take(&mut self.wrong_sync) {
