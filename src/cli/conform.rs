@@ -33,8 +33,8 @@ use stimulus::StimulusCommand;
 /// With --eds FILE, the EDS or DCF file is also checked against CiA 306 and compared with the device: existence, size,
 /// access, limits and mapping of each object, and with --store its defaults.
 ///
-/// With --stimulus CMD, the first channel that can show overloads is checked with a value outside of its measuring range.
-/// A failure of CMD, or no end within 60 s, is reported as not-judged. CMD is always run with "normal" at the end.
+/// With --stimulus CMD, the first channel with a filter is checked with a step of its input, and the first channel that
+/// can show overloads with a value outside of its measuring range. A failure of CMD, or no end within 60 s, is reported as not-judged. CMD is always run with "normal" at the end.
 ///
 /// Some cases reset the device. Without --store, settings in 2000h to 5FFFh that were not stored are then lost. They are
 /// listed as "not restored" if the object dictionary of the device is known. If the error history (1003h) is not as
@@ -83,8 +83,8 @@ pub(crate) struct Conform {
     /// Also run the cases that write to non-volatile memory, set the node-ID or execute autozero
     #[arg(long)]
     store: bool,
-    /// Run the cases of an overload. The shell command CMD sets the input of the device: it is run with the argument
-    /// overload-high, overload-low or normal, and ends when the input is set
+    /// Run the cases that need another input of the device. The shell command CMD sets the input: it is run with the
+    /// argument step, overload-high, overload-low or normal, and ends when the input is set
     #[arg(long, value_name = "CMD")]
     stimulus: Option<String>,
     /// Write the verdicts as JUnit XML, for CI servers. An existing file is replaced

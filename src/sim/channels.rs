@@ -1,8 +1,10 @@
 //! The measuring channels of a simulated device: the quantity of each, and the objects that contain its value (CiA 404:
 //! x100h, x130h, 6150h and related objects).
 
+mod filters;
+
 use super::abort::Abort;
-use super::filter::{self, Filter};
+use super::filter::Filter;
 use super::model::{Direction, Quantity};
 use super::number;
 use super::objects::Objects;
@@ -116,12 +118,14 @@ impl Channels {
         Channels { list, contents }
     }
 
-    /// Sets a signal to a constant value: `pressure`, `5.2bar`.
-    pub(super) fn hold(&mut self, signal: &str, value: &str) -> Result<(), String> {
+    /// Sets a signal to a constant value from now on: `pressure`, `5.2bar`.
+    pub(super) fn hold(&mut self, signal: &str, value: &str, time: Duration) -> Result<(), String> {
         let names: Vec<&str> = self.list.iter().map(|channel| channel.signal.name.as_str()).collect();
         let Some(place) = names.iter().position(|name| *name == signal) else {
             return Err(format!("no signal \"{signal}\" (it has: {})", names.join(", ")));
         };
+        // Earlier samples have the old value.
+        self.list[place].filtered(time);
         let quantity = &mut self.list[place].quantity;
         let value = super::bench::value_in(value, Unit(quantity.channel().unit))
             .ok_or_else(|| format!("\"{value}\" is not a value with a unit of the signal"))?;
@@ -263,41 +267,6 @@ impl Channels {
                 channel.align(objects, Some(written));
             }
         }
-    }
-
-    /// Restarts every filter, because the device has started.
-    pub(super) fn begin(&mut self, objects: &mut Objects, time: Duration) {
-        self.list.iter().for_each(|channel| channel.align(objects, None));
-        self.list.iter_mut().for_each(|channel| channel.filter.begin(objects, &channel.quantity, time));
-    }
-
-    /// Restarts a filter if the written object belongs to it.
-    pub(super) fn refilter(&mut self, objects: &mut Objects, written: ObjectId, time: Duration) {
-        let constant = self.apply_damping(objects, written);
-        let sets = |channel: &&mut Channel| channel.filter.is_set_by(constant.unwrap_or(written));
-        for channel in self.list.iter_mut().filter(sets) {
-            channel.filter.begin(objects, &channel.quantity, time);
-        }
-    }
-
-    /// Records that a PDO with these objects was sent.
-    pub(super) fn sent(&mut self, mapped: &[ObjectId]) {
-        for (index, _) in mapped.iter().filter_map(|object| self.contents.get(object)) {
-            if let Some(channel) = self.list.get_mut(*index) {
-                channel.filter.sent();
-            }
-        }
-    }
-
-    /// Computes the constant of the moving average from a written damping (MH-4, 4.3.7). Returns the changed object.
-    fn apply_damping(&self, objects: &mut Objects, object: ObjectId) -> Option<ObjectId> {
-        objects.spec(object).filter(|spec| spec.name == "damping")?;
-        let [kind, constant] = [0x61a0, 0x61a1].map(|index| ObjectId::new(index, object.sub));
-        let channel = self.by_number(object.sub).filter(|_| objects.number(kind) == 1)?;
-        let damping = Duration::from_millis(objects.number(object).into());
-        let steps = filter::constant_for(damping, channel.quantity.sample_us());
-        objects.put(constant, steps.to_le_bytes().to_vec());
-        Some(constant)
     }
 
     fn by_number(&self, number: u8) -> Option<&Channel> {

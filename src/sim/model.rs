@@ -55,6 +55,11 @@ impl Quantity {
         self.overloads.clear();
     }
 
+    /// Sets the sample time.
+    pub(super) fn set_sample(&mut self, sample: Duration) {
+        self.sample = sample.max(Duration::from_nanos(1));
+    }
+
     /// The sample time in microseconds, at least 1.
     pub(super) fn sample_us(&self) -> u128 {
         self.sample.as_micros().max(1)

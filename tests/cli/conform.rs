@@ -203,7 +203,7 @@ fn stimulus_is_run_for_each_input_and_for_the_normal_one_at_the_end() {
     assert!(done.stdout.contains(moved) && !done.stdout.contains("noise"), "{}", done.stdout);
     let inputs = std::fs::read_to_string(&log).expect("the file");
     let expected = ["high", "low", "high", "high"].map(|side| format!("overload-{side}\nnormal\n"));
-    assert_eq!(inputs, expected.concat());
+    assert_eq!(inputs, "normal\nstep\nnormal\n".repeat(2) + &expected.concat());
     let done = run("exit 3; ").exit(0);
     assert!(
         done.stdout.contains("        --stimulus overload-low: the command ended with exit code 3\n"),
@@ -222,5 +222,5 @@ fn interrupted_stimulus_is_followed_by_the_normal_one() {
     let log = bench.path("inputs").display().to_string();
     let stimulus = format!("f() {{ echo $1 >>{log}; [ $1 = normal ] || {{ kill -INT $PPID; exec sleep 60; }}; }}; f");
     bench.run_words(&["conform", "1", "--only", "404", "--stimulus", &stimulus]).exit(130);
-    assert_eq!(std::fs::read_to_string(&log).expect("the file"), "overload-high\nnormal\n");
+    assert_eq!(std::fs::read_to_string(&log).expect("the file"), "normal\nstep\nnormal\n");
 }

@@ -112,6 +112,10 @@ fn expected(expected: &Expected) -> String {
         Expected::Marker => "NaN or the smallest integer".to_owned(),
         Expected::Emergency(code) => format!("an emergency with code {code:04X}h"),
         Expected::Above(value) => format!("more than {}", short(*value)),
+        Expected::Step { percent, from, until } => {
+            format!("{percent} % of the step after {} to {}", duration(*from), duration(*until))
+        }
+        Expected::OneMean => "at most one value between the old and the new one".to_owned(),
         Expected::UnitLike(unit) => format!("a unit that can be converted to {unit}"),
         Expected::Measured { value, tolerance } => format!("{} (+/- {})", short(*value), short(*tolerance)),
     }
@@ -146,6 +150,9 @@ fn seen(seen: &Seen) -> String {
         Seen::Value(value) => format!("a default of {value}"),
         Seen::Acknowledged => "it was accepted".to_owned(),
         Seen::After(time) => format!("a frame after {}", duration(*time)),
+        Seen::StepAfter(Some(time)) => format!("after {}", duration(*time)),
+        Seen::StepAfter(None) => "not reached".to_owned(),
+        Seen::Values(count) => format!("{count} values"),
         Seen::Unit(unit) => unit.to_string(),
         Seen::Measured(value) => short(*value),
     }
@@ -179,6 +186,7 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::UnknownCode(object) => format!("the meaning of the number in {object} is unknown"),
         WhyNot::Rejected(object, code) => format!("{object}: the device rejected the write: {code}"),
         WhyNot::NotMoved(object) => format!("{object} did not change enough"),
+        WhyNot::StepTooSlow => "the step of the input takes longer than the filter".to_owned(),
         WhyNot::NearZero(object) => format!("{object} is too close to zero"),
         WhyNot::NoValidValue(object) => format!("{object} is not valid, or at the end of its range"),
         WhyNot::NoStimulus => "not run without --stimulus".to_owned(),

@@ -178,3 +178,32 @@ fn limit_that_was_stored_in_one_type_holds_in_all_after_the_start() {
     assert_eq!(objects.real(id("7135:1")), Some(4250.0));
     assert_eq!(objects.real(id("9135:1")), Some(4250.0));
 }
+
+/// Writes an object, as an SDO client does.
+fn write(objects: &mut Objects, channels: &mut Channels, object: &str, bytes: &[u8]) {
+    objects.put(id(object), bytes.to_vec());
+    channels.refilter(objects, id(object), AT);
+}
+
+/// The time until a repeating average over four samples is complete after a step from 5 to 9 bar.
+fn time_of_step(sample_us: u32) -> Option<Duration> {
+    let (mut objects, mut channels) = still("d20", 5.0, &[]);
+    channels.begin(&mut objects, Duration::ZERO);
+    write(&mut objects, &mut channels, "61A1:1", &[4, 0]);
+    write(&mut objects, &mut channels, "61A0:1", &[2]);
+    write(&mut objects, &mut channels, "6114:1", &sample_us.to_le_bytes());
+    // The mean that contains the step was not read since its start.
+    let step = AT + Duration::from_millis(99);
+    channels.hold("pressure", "9bar", step).expect("a value");
+    let times = (0..200).map(Duration::from_millis);
+    times.into_iter().find(|time| {
+        let value = channels.read(&objects, id("6130:1"), step + *time).expect("shown");
+        real(&value) == 9.0
+    })
+}
+
+#[test]
+fn filter_has_the_sample_time_of_6114h_and_keeps_earlier_samples() {
+    let [one, two] = [1000, 2000].map(|sample_us| time_of_step(sample_us).expect("shown"));
+    assert!((4..=8).contains(&one.as_millis()) && (8..=16).contains(&two.as_millis()), "{one:?} {two:?}");
+}

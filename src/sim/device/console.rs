@@ -71,7 +71,7 @@ impl Device {
     /// # Errors
     /// The device has no such signal, or the value has no unit of the signal.
     pub fn hold(&mut self, signal: &str, value: &str, now: Mono, out: &mut Outbox) -> Result<(), String> {
-        self.memory.channels.hold(signal, value)?;
+        self.memory.channels.hold(signal, value, now.since_start())?;
         if self.phase != Phase::Off {
             self.update_overloads(now);
             self.send_emergencies(now, out);

@@ -7,6 +7,7 @@ pub(super) mod digits;
 pub(super) mod events;
 pub(super) mod filter;
 pub(super) mod overload;
+pub(super) mod step;
 pub(super) mod unit;
 pub(super) mod values;
 

@@ -127,6 +127,17 @@ pub enum Expected {
     Emergency(u16),
     /// A value above this one.
     Above(f64),
+    /// This share of a step of the input between these times.
+    Step {
+        /// The share in per cent.
+        percent: u8,
+        /// The first time.
+        from: Duration,
+        /// The last time.
+        until: Duration,
+    },
+    /// At most one value between the values before and after a step of the input.
+    OneMean,
     /// A unit that can be converted to this one.
     UnitLike(Unit),
     /// A value in the unit of its channel.
@@ -171,6 +182,10 @@ pub enum Seen {
     Value(Scalar),
     /// The device accepted it.
     Acknowledged,
+    /// This share of the step after this time; `None` if it was not reached.
+    StepAfter(Option<Duration>),
+    /// This many different values.
+    Values(usize),
     /// A unit.
     Unit(Unit),
     /// A value in the unit of its channel.
@@ -230,6 +245,8 @@ pub enum WhyNot {
     Rejected(ObjectId, AbortCode),
     /// The process value has not moved far enough.
     NotMoved(ObjectId),
+    /// The step of the input takes longer than the response that it causes.
+    StepTooSlow,
     /// The process value is so small that both expected values are the same.
     NearZero(ObjectId),
     /// The process value is not valid, or at the end of its range.

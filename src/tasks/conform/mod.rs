@@ -58,6 +58,7 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
         cia404::unit::CASES,
         cia404::digits::CASES,
         cia404::filter::CASES,
+        cia404::step::CASES,
         cia404::autozero::CASES,
         cia404::events::CASES,
         cia404::overload::CASES,

@@ -10,6 +10,8 @@ use std::time::Duration;
 pub enum Input {
     /// As before the check.
     Normal,
+    /// Inside of the measuring range, and far from the normal value.
+    Step,
     /// Above the measuring range.
     OverloadHigh,
     /// Below the measuring range.
@@ -21,6 +23,7 @@ impl Input {
     pub fn name(self) -> &'static str {
         match self {
             Input::Normal => "normal",
+            Input::Step => "step",
             Input::OverloadHigh => "overload-high",
             Input::OverloadLow => "overload-low",
         }

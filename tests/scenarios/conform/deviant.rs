@@ -128,18 +128,22 @@ impl Deviant {
         if std::mem::replace(&mut self.input, input) == input {
             return;
         }
-        let values = match self.model.description.name.as_str() {
-            "mh4" => ["1.2bar", "20bar", "-5bar"],
-            "dps" => ["17psi", "200psi", "-50psi"],
-            "hydac" => ["120bar", "600bar", "-90bar"],
-            other => panic!("{other} shows no overload"),
+        let (signal, normal, step, overload) = match self.model.description.name.as_str() {
+            "mh4" => ("pressure", "1.2bar", "4bar", Some(["20bar", "-5bar"])),
+            "d20" => ("pressure", "5bar", "9bar", None),
+            "dps" => ("pressure", "17psi", "25psi", Some(["200psi", "-50psi"])),
+            "mc1609" => ("ch1", "25degC", "200degC", None),
+            "hydac" => ("pressure", "120bar", "250bar", Some(["600bar", "-90bar"])),
+            other => panic!("the input of {other} is not known"),
         };
-        let value = values[[Input::Normal, Input::OverloadHigh, Input::OverloadLow]
-            .iter()
-            .position(|one| *one == input)
-            .expect("an input")];
+        let value = match input {
+            Input::Normal => normal,
+            Input::Step => step,
+            Input::OverloadHigh => overload.expect("an overload")[0],
+            Input::OverloadLow => overload.expect("an overload")[1],
+        };
         let mut inner = Outbox::default();
-        self.device.hold("pressure", value, now, &mut inner).expect("a value");
+        self.device.hold(signal, value, now, &mut inner).expect("a value");
         self.send(now, &mut inner, out);
     }
 

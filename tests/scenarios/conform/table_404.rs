@@ -1,6 +1,6 @@
 //! One deviation for each case of the area 404.
 
-use super::deviant::Deviation::{Answers, Ignores, Sends};
+use super::deviant::Deviation::{Answers, Both, Ignores, Sends, Takes};
 use super::deviant::{Memory, NODE};
 use super::table::{Row, ack, is, is_nmt, read, with};
 use super::table_more::is_tpdo;
@@ -34,6 +34,18 @@ fn integer(frame: Frame, object: [u8; 3], change: fn(i16) -> i16) -> Vec<Frame> 
     }
 }
 
+/// Takes a written value for another one.
+fn written_as(frame: Frame, object: [u8; 3], value: u32, other: u32) -> Frame {
+    match frame.data() {
+        [0x22..=0x2f, x, y, z, a, b, c, d]
+            if [*x, *y, *z] == object && u32::from_le_bytes([*a, *b, *c, *d]) == value =>
+        {
+            with(frame, |data| data[4..].copy_from_slice(&other.to_le_bytes()))[0]
+        }
+        _ => frame,
+    }
+}
+
 /// Counts the acknowledged writes of autozero and offset: two in each case.
 fn count_zeros(memory: &mut Memory, frame: &Frame) {
     memory.count += u32::from(matches!(frame.data(), [0x60, 0x25 | 0x27, 0x61, 1, ..]));
@@ -41,6 +53,7 @@ fn count_zeros(memory: &mut Memory, frame: &Frame) {
 
 const ZERO: [u8; 3] = [0x25, 0x61, 1];
 const STATUS: [u8; 3] = [0x50, 0x61, 1];
+const SAMPLE_TIME: [u8; 3] = [0x14, 0x61, 1];
 const DELTA: [u8; 3] = [0x33, 0x61, 1];
 const LOWER: [u8; 3] = [0x34, 0x61, 1];
 
@@ -131,9 +144,35 @@ pub(super) const ROWS: &[Row] = &[
         "mh4",
         "404-31",
         Sends(|memory, frame| {
-            let is_filtered = memory.written([0xa0, 0x61, 1]) == 1;
+            // Only the constant of this case.
+            let is_filtered = memory.written([0xa0, 0x61, 1]) == 1 && memory.written([0xa1, 0x61, 1]) == 4;
             if is_filtered { real(frame, [0x30, 0x61, 1], |value| value * 1.5) } else { vec![frame] }
         }),
+    ),
+    // The larger constant is the same as the smaller one.
+    ("mh4", "404-32", Takes(|_, frame| written_as(*frame, [0xa1, 0x61, 1], 500, 250))),
+    // The repeating average is a moving one.
+    ("mh4", "404-33", Takes(|_, frame| written_as(*frame, [0xa0, 0x61, 1], 2, 1))),
+    (
+        "d20",
+        "404-34",
+        Sends(|memory, frame| {
+            let is_twice = memory.written(SAMPLE_TIME) == 2000;
+            if is_twice { read(memory, frame, SAMPLE_TIME, |data| data[4..6].fill(0)) } else { vec![frame] }
+        }),
+    ),
+    // The sample time is only shown.
+    (
+        "hydac",
+        "404-35",
+        Both(
+            |_, frame| written_as(*frame, SAMPLE_TIME, 2000, 1000),
+            |memory, frame| {
+                let is_twice = memory.written(SAMPLE_TIME) == 2000;
+                let shown = |data: &mut Vec<u8>| data[4..].copy_from_slice(&2000u32.to_le_bytes());
+                if is_twice { read(memory, frame, SAMPLE_TIME, shown) } else { vec![frame] }
+            },
+        ),
     ),
     (
         "mh4",

@@ -1,4 +1,4 @@
-//! The filter (61A0h, 61A1h). A step response needs a step of the input, so that only the mean is compared.
+//! The filter (61A0h, 61A1h) without a change of the input: rejected types, and the mean. `step` checks its response.
 
 use super::super::case::{Area, Case, Run, Severity::*};
 use super::super::codes;
@@ -27,8 +27,8 @@ pub(in super::super) const CASES: &[Case] = &[
     .alone(),
 ];
 
-const TYPE: u16 = 0x61a0;
-const CONSTANT: u16 = 0x61a1;
+pub(super) const TYPE: u16 = 0x61a0;
+pub(super) const CONSTANT: u16 = 0x61a1;
 
 /// One channel is enough: the filters of the other channels are the same software.
 const ONE: usize = 1;
