@@ -155,7 +155,7 @@ fn reports_are_written_and_compared() {
     let done = bench.run(&format!("conform diff {old} {new}")).exit(1);
     assert_eq!(
         done.stdout,
-        "CASE   BEFORE  AFTER     WHAT\nOD-09  pass    deviates  1005h and 1014h contain allowed CAN-IDs\n"
+        "CASE   BEFORE  AFTER     WHAT\nOD-09  pass    deviates  1005h, 1012h and 1014h contain allowed CAN-IDs\n"
     );
     bench.run(&format!("conform diff {old} {old}")).prints("");
     bench.run(&format!("conform diff {old} {html}")).exit(2);

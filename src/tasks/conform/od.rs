@@ -42,9 +42,9 @@ pub(super) const CASES: &[Case] = &[
         .matters(Low, "Tools show unreadable characters."),
     case("OD-08", "1000h, 1008h and 1018h have the same values in each read", "CiA 301, constant objects", constants)
         .matters(High, "Masters confuse the device with another one."),
-    case("OD-09", "1005h and 1014h contain allowed CAN-IDs", "CiA 301, restricted CAN-IDs", cob_ids)
+    case("OD-09", "1005h, 1012h and 1014h contain allowed CAN-IDs", "CiA 301, restricted CAN-IDs", cob_ids)
         .matters(High, "SYNC or emergencies disturb other services."),
-    case("OD-10", "1005h and 1014h reject restricted CAN-IDs", "CiA 301, restricted CAN-IDs", restricted)
+    case("OD-10", "1005h, 1012h and 1014h reject restricted CAN-IDs", "CiA 301, restricted CAN-IDs", restricted)
         .matters(Medium, "A wrong setting lets the device disturb SDO or NMT of other nodes."),
 ];
 
@@ -197,7 +197,7 @@ fn constants(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     Ok(Verdict::of(findings))
 }
 
-const COB_IDS: [ObjectId; 2] = [ObjectId::new(0x1005, 0), ObjectId::new(0x1014, 0)];
+const COB_IDS: [ObjectId; 3] = [ObjectId::new(0x1005, 0), ObjectId::new(0x1012, 0), ObjectId::new(0x1014, 0)];
 
 fn cob_ids(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let (mut findings, mut is_any) = (Vec::new(), false);
