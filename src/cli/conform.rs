@@ -2,14 +2,16 @@
 
 mod stimulus;
 
-use super::exit::FileError;
+use super::exit::{FileError, open_stdout, stdout};
 use super::file::ReportFile;
 use super::journal::SettingsJournal;
 use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::output::conform::{CaseRow, ConformRecord, ResultRow, SavedReport, left, summary};
+use crate::output::conform::{CaseRow, ConformRecord, ResultRow, SavedReport, left, summary, write_skipped};
 use crate::output::failure::ErrorMessage;
+use crate::output::report::Format;
+use crate::output::stdout_width;
 use crate::tasks::conform::{Area, CaseResult, ConformFailure, ConformOptions, Stimulus, cases, conform};
 use crate::tasks::{Failure, Kind, config};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -193,12 +195,13 @@ impl Conform {
         let overrides = descriptions::overrides(global, &[node])?;
         let console = global.console();
         let mut stream = global.stream::<ResultRow>()?;
+        let width = stdout_width();
         let (report, bus, printed) = global.with_master(|master| {
             let mut journal = Journal { bus: master.bus().name().to_owned(), console: &console, file: None };
             let mut printed = Ok(());
             let mut observe = |result: &CaseResult| {
                 if printed.is_ok() {
-                    printed = stream.push(&ResultRow { node, result: result.clone() });
+                    printed = stream.push(&ResultRow { node, result: result.clone(), width });
                 }
             };
             let mut command = self.stimulus.as_deref().map(StimulusCommand::new).transpose()?;
@@ -207,7 +210,10 @@ impl Conform {
             let bus = (master.bus().name().to_owned(), master.bus().bit_rate(), master.bus().now().wall);
             Ok((report, bus, printed))
         })?;
-        printed.map_err(super::exit::stdout)?;
+        printed.map_err(stdout)?;
+        if global.format == Format::Text {
+            write_skipped(&report.results, width, &mut open_stdout()?.lock()).map_err(stdout)?;
+        }
         let command = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ");
         let (bus, bit_rate, time) = bus;
         let record = ConformRecord { time, bus: &bus, bit_rate, command: &command, report: &report };

@@ -2,10 +2,12 @@
 
 mod diff;
 mod record;
+mod skipped;
 mod words;
 
 pub use diff::{DiffRow, SavedReport};
 pub use record::ConformRecord;
+pub use skipped::write_skipped;
 pub use words::finding;
 use words::page;
 pub(in crate::output) use words::stimulus_failure;
@@ -50,6 +52,8 @@ pub struct ResultRow {
     pub node: NodeId,
     /// The result.
     pub result: CaseResult,
+    /// The width of the terminal in characters; `None`: lines are not wrapped.
+    pub width: Option<usize>,
 }
 
 /// The frames as in `candump`: `>` for sent ones.
@@ -107,21 +111,43 @@ impl Report for ResultRow {
 
     fn line(&self, out: &mut dyn Write) -> io::Result<()> {
         let (result, case) = (&self.result, self.result.case);
-        writeln!(out, "{:<7} {:<14}  {}", case.id, result.verdict.name(), case.sentence)?;
-        for detail in record::details(result) {
-            writeln!(out, "        {}", text::safe(&detail))?;
+        if skipped::is_skipped(result) {
+            return Ok(());
+        }
+        let head = format!("{:<7} {:<10}  ", case.id, result.verdict.name());
+        wrap(out, &head, case.sentence, self.width)?;
+        let mut detail = |line: &str| wrap(out, "        ", line, self.width);
+        for found in record::details(result) {
+            detail(&text::safe(&found))?;
         }
         if let Verdict::Deviates(_) = result.verdict {
             match &result.known {
-                Some(known) => writeln!(out, "        {}", page(known))?,
-                None => writeln!(out, "        {} ({}): {}", case.severity.name(), case.clause, case.meaning)?,
+                Some(known) => detail(&page(known))?,
+                None => detail(&format!("{} ({}): {}", case.severity.name(), case.clause, case.meaning))?,
             }
         }
         if !result.not_restored.is_empty() {
-            writeln!(out, "        not restored: {}", super::failure::conform::list(&result.not_restored))?;
+            detail(&format!("not restored: {}", super::failure::conform::list(&result.not_restored)))?;
         }
         Ok(())
     }
+}
+
+/// The shortest text beside the number and the verdict of a case.
+const MIN_TEXT_WIDTH: usize = 30;
+
+/// Writes a line. On a terminal, it is broken at spaces, and the further lines start below the text.
+fn wrap(out: &mut dyn Write, head: &str, line: &str, width: Option<usize>) -> io::Result<()> {
+    let indent = head.chars().count();
+    let lines = match width {
+        Some(width) => text::folded(line, width.saturating_sub(indent).max(MIN_TEXT_WIDTH)),
+        None => vec![line.to_owned()],
+    };
+    for (number, line) in lines.iter().enumerate() {
+        let before = if number == 0 { head } else { "" };
+        writeln!(out, "{before:<indent$}{line}")?;
+    }
+    Ok(())
 }
 
 /// The counts in one line: `62 cases in 8.1 s: 50 pass, 1 deviate, 2 known deviations, 9 not applicable`.

@@ -363,14 +363,14 @@ fn sample_time(session: &mut Session<'_, '_>, channel: &Channel) -> Found<(Objec
 }
 
 fn read_back(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
-    let mut verdict = Verdict::NotApplicable(WhyNot::NoChannel);
+    let mut other = None;
     for channel in channels(session)? {
         match sample_time(session, &channel)? {
             Ok((object, twice)) => return read_back_of(session, object, &twice),
-            Err(other) => verdict = other,
+            Err(verdict) => other = other.or(Some(verdict)),
         }
     }
-    Ok(verdict)
+    Ok(other.unwrap_or(Verdict::NotApplicable(WhyNot::NoChannel)))
 }
 
 fn read_back_of(session: &mut Session<'_, '_>, object: ObjectId, twice: &[u8]) -> Result<Verdict, Error> {
