@@ -182,6 +182,16 @@ fn error_during_the_check_is_named_at_the_end() {
 }
 
 #[test]
+fn autozero_is_executed_only_with_store() {
+    let bench = Bench::of("mh4@1");
+    let has_autozero = |options: &str| {
+        let done = bench.run(&format!("conform 1 --only 404 {options}")).exit(0);
+        done.frames.iter().any(|frame| frame.contains("601#23256101"))
+    };
+    assert!(!has_autozero("") && has_autozero("--store"));
+}
+
+#[test]
 fn life_guarding_of_the_device_is_not_started() {
     let bench =
         Bench::described("[[device]]\nkind = \"mc1609\"\nnode = 1\nset = { \"0x100C\" = 100, \"0x100D\" = 3 }\n");

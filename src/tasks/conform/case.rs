@@ -219,7 +219,12 @@ impl Case {
 
     /// The case sends frames that concern all nodes.
     pub(super) const fn alone(self) -> Case {
-        Case { needs: Needs::SoleNode, ..self }
+        let needs = match self.needs {
+            Needs::Nothing | Needs::SoleNode => Needs::SoleNode,
+            Needs::Store | Needs::SoleNodeAndStore => Needs::SoleNodeAndStore,
+            Needs::Stimulus => Needs::Stimulus,
+        };
+        Case { needs, ..self }
     }
 
     /// The case needs another input of the device.
