@@ -2,7 +2,7 @@
 
 mod stimulus;
 
-use super::exit::{FileError, open_stdout, stdout};
+use super::exit::{FileError, stdout};
 use super::file::ReportFile;
 use super::journal::SettingsJournal;
 use super::{Global, descriptions};
@@ -10,7 +10,6 @@ use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::conform::{CaseRow, ConformRecord, ResultRow, SavedReport, left, summary, write_skipped};
 use crate::output::failure::ErrorMessage;
-use crate::output::report::Format;
 use crate::output::stdout_width;
 use crate::tasks::conform::{Area, CaseResult, ConformFailure, ConformOptions, Stimulus, cases, conform};
 use crate::tasks::{Failure, Kind, config};
@@ -211,9 +210,7 @@ impl Conform {
             Ok((report, bus, printed))
         })?;
         printed.map_err(stdout)?;
-        if global.format == Format::Text {
-            write_skipped(&report.results, width, &mut open_stdout()?.lock()).map_err(stdout)?;
-        }
+        stream.end_text(|out| write_skipped(&report.results, width, out)).map_err(stdout)?;
         let command = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ");
         let (bus, bit_rate, time) = bus;
         let record = ConformRecord { time, bus: &bus, bit_rate, command: &command, report: &report };

@@ -215,6 +215,17 @@ impl<R: Report, W: Write> Stream<R, W> {
         self.out.write_all(&bytes)?;
         self.out.flush()
     }
+
+    /// Prints what follows the last report in text. The other formats have only reports.
+    ///
+    /// # Errors
+    /// `out` cannot be written.
+    pub fn end_text(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+        if self.format == Format::Text {
+            write(&mut self.out)?;
+        }
+        self.out.flush()
+    }
 }
 
 /// Writes a table with a heading; nothing if there are no reports.
