@@ -8,6 +8,9 @@ use std::time::Duration;
 /// The time between two checks whether the command has ended.
 const STEP: Duration = Duration::from_millis(20);
 
+/// How long a command may take to end after SIGTERM.
+const GRACE: Duration = Duration::from_secs(1);
+
 /// Why a command did not end with exit code 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ProgramError {
@@ -40,7 +43,8 @@ impl ShellCommand<'_> {
     /// Runs the command with an argument, and waits for its end. Its standard output is written to standard error.
     ///
     /// # Errors
-    /// It did not end with exit code 0. After a time-out or Ctrl-C, it is killed.
+    /// It did not end with exit code 0. After a time-out or Ctrl-C, it gets SIGTERM, so that it can end its children. If
+    /// it is still running after 1 s, it is killed.
     pub fn run(&mut self, argument: &str) -> Result<(), ProgramError> {
         // The bus reports earlier signals.
         while self.interrupts.take() {}
@@ -51,9 +55,7 @@ impl ShellCommand<'_> {
             .map_err(|error| ProgramError::NotStarted(error.to_string()))?;
         let result = self.wait(&mut child);
         if result.is_err() {
-            // It may have ended already.
-            let _ = child.kill();
-            let _ = child.wait();
+            end(&mut child);
         }
         result
     }
@@ -76,6 +78,36 @@ impl ShellCommand<'_> {
     }
 }
 
+/// Ends a command, if it has not ended already.
+fn end(child: &mut Child) {
+    // Its number may belong to another process after it has ended.
+    if !matches!(child.try_wait(), Ok(None)) {
+        return;
+    }
+    terminate(child);
+    for _ in 0..GRACE.as_millis() / STEP.as_millis() {
+        if !matches!(child.try_wait(), Ok(None)) {
+            return;
+        }
+        std::thread::sleep(STEP);
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+}
+
+/// Sends SIGTERM.
+#[cfg(unix)]
+#[expect(unsafe_code, reason = "the standard library can only kill")]
+fn terminate(child: &Child) {
+    if let Ok(id) = libc::pid_t::try_from(child.id()) {
+        // SAFETY: the call has no memory arguments. The number belongs to the child until it was waited for.
+        unsafe { libc::kill(id, libc::SIGTERM) };
+    }
+}
+
+#[cfg(not(unix))]
+fn terminate(_: &Child) {}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,5 +120,15 @@ mod tests {
         assert_eq!(run("exec sleep 60; ", "low"), Err(ProgramError::TimedOut));
         assert_eq!(run("test low =", "low"), Ok(()));
         assert_eq!(run("test low =", "normal"), Err(ProgramError::Exit(Some(1))));
+    }
+
+    #[test]
+    fn command_can_end_its_children_after_a_time_out() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let ended = folder.path().join("ended").display().to_string();
+        let command = format!("trap 'kill $!; echo ended >{ended}; exit' TERM; sleep 60 & wait; ");
+        let result = ShellCommand::new(&command, Duration::from_millis(500)).expect("signals").run("step");
+        assert_eq!(result, Err(ProgramError::TimedOut));
+        assert_eq!(std::fs::read_to_string(ended).expect("the file"), "ended\n");
     }
 }
