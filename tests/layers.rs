@@ -110,6 +110,7 @@ const UNSAFE: &[(&str, usize, &str)] = &[
     ("bus/host.rs", 1, "gethostname: std does not know the host name"),
     ("bus/interrupt.rs", 2, "sigaction and signal: std can neither read nor set the action of a signal"),
     ("bus/poll.rs", 2, "ppoll and poll: std cannot wait for a descriptor"),
+    ("bus/program.rs", 1, "kill: std can end a child only by SIGKILL"),
     ("bus/replay/text.rs", 2, "mktime and its zeroed argument: std knows no time zones"),
     ("bus/socketcan/receive.rs", 3, "recvmmsg and its zeroed headers: no safe crate returns the drop counter"),
     ("bus/time.rs", 2, "localtime_r and its zeroed argument: std knows no time zones"),
