@@ -66,6 +66,16 @@ macro_rules! delegate_bus {
             $inner.mono()
         }
     };
+    ($this:ident, $inner:expr => waits_without_clock) => {
+        fn waits_without_clock(&$this) -> bool {
+            $inner.waits_without_clock()
+        }
+    };
+    ($this:ident, $inner:expr => receive_answer) => {
+        fn receive_answer(&mut $this) -> Result<Option<$crate::bus::Event>, $crate::bus::BusError> {
+            $inner.receive_answer()
+        }
+    };
     ($this:ident, $inner:expr => listen) => {
         fn listen(&mut $this, filters: &$crate::bus::Filters) -> Result<(), $crate::bus::BusError> {
             $inner.listen(filters)

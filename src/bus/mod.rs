@@ -76,6 +76,11 @@ pub trait Bus: BitRateControl {
         self.now().mono
     }
 
+    /// Whether [`Bus::receive_answer`] waits. After a send, the caller then need not read the clock.
+    fn waits_without_clock(&self) -> bool {
+        false
+    }
+
     /// Sets which frames [`Bus::receive`] returns from now on. A new bus returns all frames. A bus may also return
     /// frames that do not match.
     ///
@@ -95,6 +100,15 @@ pub trait Bus: BitRateControl {
     /// # Errors
     /// The bus failed. The caller may call again.
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError>;
+
+    /// Like [`Bus::receive`], with a short wait (some 10 ms) that does not read the clock. On some machines, reading the
+    /// clock takes as long as receiving a frame. `None`: no event, or this bus has no such wait.
+    ///
+    /// # Errors
+    /// The bus failed. The caller may call again.
+    fn receive_answer(&mut self) -> Result<Option<Event>, BusError> {
+        Ok(None)
+    }
 
     /// The size of the buffer for received frames that are not read yet. `None` if it has no limit or the limit is
     /// unknown.
@@ -155,8 +169,8 @@ pub trait BitRateControl {
 }
 
 impl<B: Bus + ?Sized> Bus for Box<B> {
-    delegate_bus!(self, (**self) => name timestamps is_live sends_remote_frames waits now mono listen send receive receive_buffer
-        unreported_drops finish);
+    delegate_bus!(self, (**self) => name timestamps is_live sends_remote_frames waits now mono
+        waits_without_clock listen send receive receive_answer receive_buffer unreported_drops finish);
 }
 
 impl<B: BitRateControl + ?Sized> BitRateControl for Box<B> {
@@ -164,8 +178,8 @@ impl<B: BitRateControl + ?Sized> BitRateControl for Box<B> {
 }
 
 impl<B: Bus + ?Sized> Bus for &mut B {
-    delegate_bus!(self, (**self) => name timestamps is_live sends_remote_frames waits now mono listen send receive receive_buffer
-        unreported_drops finish);
+    delegate_bus!(self, (**self) => name timestamps is_live sends_remote_frames waits now mono
+        waits_without_clock listen send receive receive_answer receive_buffer unreported_drops finish);
 }
 
 impl<B: BitRateControl + ?Sized> BitRateControl for &mut B {

@@ -181,6 +181,15 @@ impl<B: Bus> Bus for Paced<B> {
         Ok(())
     }
 
+    fn waits_without_clock(&self) -> bool {
+        self.load.is_none() && self.bus.waits_without_clock()
+    }
+
+    fn receive_answer(&mut self) -> Result<Option<Event>, BusError> {
+        // During the measurement, each frame is counted.
+        if self.load.is_some() { Ok(None) } else { self.bus.receive_answer() }
+    }
+
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
         loop {
             let event = self.bus.receive(deadline)?;

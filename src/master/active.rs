@@ -26,6 +26,8 @@ pub(super) struct ActiveTransfer {
     pub(super) machine: Machine,
     /// The end of the wait for an answer. It is set when our last frame was sent. Other traffic never extends it.
     pub(super) deadline: Option<Mono>,
+    /// When the clock must be read to start the time-out; `None` if it has started. See [`super::send::SendTime`].
+    pub(super) read_clock_at: Option<Mono>,
     /// The number of our frames that still wait to be sent.
     pub(super) unsent: usize,
     pub(super) attempts_left: u32,
@@ -64,7 +66,7 @@ impl ActiveTransfer {
         let attempts = if request.falls_back() { 0 } else { timing.retries };
         let attempts_left = if request.repeatable { attempts } else { 0 };
         let machine = request.machine(accept_60);
-        let (deadline, asked_at, begun_at, deferred) = (None, None, None, None);
+        let (deadline, read_clock_at, asked_at, begun_at, deferred) = (None, None, None, None, None);
         let foreign = ForeignTraffic::default();
         ActiveTransfer {
             ticket,
@@ -73,6 +75,7 @@ impl ActiveTransfer {
             request,
             machine,
             deadline,
+            read_clock_at,
             unsent: 0,
             attempts_left,
             asked_at,
@@ -112,7 +115,7 @@ impl ActiveTransfer {
             outgoing.drop_ticket(self.ticket);
         }
         self.unsent = frames.len();
-        self.deadline = None;
+        (self.deadline, self.read_clock_at) = (None, None);
         if self.asked_at.is_none() {
             outgoing.set_timed();
         }
@@ -153,7 +156,7 @@ impl ActiveTransfer {
         let now = received.at.mono;
         self.foreign.record(&received.frame, now);
         if let Some(until) = self.foreign.back_off_until() {
-            self.deadline = Some(until);
+            (self.deadline, self.read_clock_at) = (Some(until), None);
             return true;
         }
         let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();

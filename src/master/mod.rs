@@ -11,6 +11,7 @@ mod machine;
 mod missed_answer;
 mod parallel;
 mod raw;
+mod receive;
 mod receive_times;
 mod request;
 mod sdo;
@@ -358,19 +359,12 @@ impl<'bus> Master<'bus> {
             if self.sdo.has_finished() {
                 continue;
             }
-            let mut deadline = until;
-            for other in [retry_at, self.sdo.next_deadline()].into_iter().flatten() {
-                deadline = deadline.min(other);
-            }
             if self.sdo.wants_all_frames() != self.receives_all {
                 self.receives_all = !self.receives_all;
                 let filters = if self.receives_all { &Filters::All } else { &self.filters };
                 self.bus.listen(filters)?;
             }
-            let event = match self.pending.take() {
-                Some(received) => Event::Frame(received),
-                None => self.bus.receive(deadline)?,
-            };
+            let Some((event, deadline)) = self.receive(until.min(retry_at.unwrap_or(until)))? else { continue };
             match event {
                 Event::Frame(received) => {
                     let at = received.at.mono;
@@ -381,6 +375,9 @@ impl<'bus> Master<'bus> {
                     }
                     if let Some(transcript) = &mut self.outgoing.transcript {
                         transcript.push(at, false, received.frame);
+                    }
+                    if self.sdo.needs_clock(at) {
+                        self.start_timeouts();
                     }
                     self.sdo.on_time(at, &self.timing, &mut self.outgoing);
                     if self.bypasses_sdo || !self.sdo.on_frame(&received, &self.timing, &mut self.outgoing) {
@@ -417,8 +414,8 @@ impl<'bus> Master<'bus> {
         self.seen = now;
         self.sdo.advance(&self.timing, now, &mut self.outgoing);
         let (sdo, timing) = (&mut self.sdo, &self.timing);
-        let retry_at = self.outgoing.flush(self.bus, now, timing.timeout, &mut |ticket, around| {
-            sdo.on_sent(ticket, around, timing);
+        let retry_at = self.outgoing.flush(self.bus, now, timing.timeout, &mut |ticket, time| {
+            sdo.on_sent(ticket, time, timing);
         })?;
         Ok(retry_at)
     }

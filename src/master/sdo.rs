@@ -7,10 +7,11 @@ mod receive;
 use super::Timing;
 use super::active::ActiveTransfer;
 use super::missed_answer::MissedAnswers;
+use super::receive::CLOCK_DELAY;
 use super::receive_times::ReceiveTimes;
 use super::request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 use super::second_answer::{Answers, OnTwoDevices, SecondAnswer};
-use super::send::Outgoing;
+use super::send::{Outgoing, SendTime};
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
@@ -28,9 +29,9 @@ struct StaleRequest {
 }
 
 #[derive(Debug, Default)]
-struct Node {
+pub(super) struct Node {
     waiting: VecDeque<(Ticket, Request)>,
-    active: Option<ActiveTransfer>,
+    pub(super) active: Option<ActiveTransfer>,
     stale: Vec<StaleRequest>,
     answers: Answers,
     /// Whether a write was acknowledged.
@@ -48,11 +49,13 @@ type Finished = VecDeque<(Ticket, Result<Answer, SdoError>)>;
 /// The client side of all SDO channels.
 #[derive(Debug, Default)]
 pub(super) struct SdoClient {
-    nodes: BTreeMap<NodeId, Node>,
+    pub(super) nodes: BTreeMap<NodeId, Node>,
     finished: Finished,
     next_ticket: u64,
     /// A lower bound of the next deadline. It avoids a search through all nodes for each frame.
     due: Option<Mono>,
+    /// Whether a transfer in progress may have [`ActiveTransfer::read_clock_at`].
+    pub(super) awaits_clock: bool,
     /// When all transfers together must have ended, and the time that they had.
     limit: Option<(Mono, Duration)>,
     /// Whether a node has a waiting transfer and none in progress.
@@ -149,9 +152,9 @@ impl SdoClient {
         }
     }
 
-    /// The bus has accepted a frame of a transfer, between these two moments. The time-out starts after the last queued
-    /// frame. An answer can be older than the second moment, if the program was interrupted after sending.
-    pub(super) fn on_sent(&mut self, ticket: Ticket, [before, now]: [Mono; 2], timing: &Timing) {
+    /// The bus has accepted a frame of a transfer. The time-out starts after the last queued frame. An answer can be
+    /// older than the moment after sending, if the program was interrupted.
+    pub(super) fn on_sent(&mut self, ticket: Ticket, SendTime { before, after }: SendTime, timing: &Timing) {
         let active = self.nodes.get_mut(&ticket.node).and_then(|node| node.active.as_mut());
         if let Some(active) = active.filter(|active| active.ticket == ticket) {
             active.machine.on_sent();
@@ -161,14 +164,25 @@ impl SdoClient {
             }
             active.unsent = active.unsent.saturating_sub(1);
             if active.unsent == 0 {
-                active.deadline = Some(now + active.timeout(timing));
-                if active.machine.has_begun() {
-                    let end = *active.begun_at.get_or_insert(now) + active.time(timing);
-                    active.deadline = earlier(active.deadline, Some(end));
+                match after {
+                    Some(after) => active.start_timeout(after, timing),
+                    None => {
+                        active.read_clock_at = Some(before + CLOCK_DELAY);
+                        self.awaits_clock = true;
+                    }
                 }
-                self.due = earlier(self.due, active.deadline);
+                self.due = earlier(self.due, active.due());
             }
         }
+    }
+
+    pub(super) fn active_transfers(&self) -> impl Iterator<Item = &ActiveTransfer> {
+        self.nodes.values().filter_map(|node| node.active.as_ref())
+    }
+
+    /// Computes the next deadline from all transfers.
+    pub(super) fn update_due(&mut self) {
+        self.due = self.active_transfers().filter_map(ActiveTransfer::due).min();
     }
 
     /// Bytes transferred so far and in total, if known; `None` if the transfer is not in progress.
@@ -242,7 +256,7 @@ impl SdoClient {
             return;
         }
         self.handle_timeouts(now, timing, outgoing);
-        self.due = self.nodes.values().filter_map(|node| node.active.as_ref()?.deadline).min();
+        self.update_due();
         self.can_start = self.nodes.values().any(|node| node.active.is_none() && !node.waiting.is_empty());
     }
 

@@ -18,6 +18,15 @@ const MAX_QUEUED_FRAMES: u32 = 4;
 /// The longest classic frame with an 11-bit identifier, in bits: 8 data bytes, all stuff bits, intermission.
 const LONGEST_FRAME_BITS: u32 = 135;
 
+/// When a frame of a transfer was passed to the bus.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SendTime {
+    /// A moment before.
+    pub(super) before: Mono,
+    /// A moment after; `None` if the clock was not read.
+    pub(super) after: Option<Mono>,
+}
+
 /// The queue between the protocol machines and the bus.
 pub(super) struct Outgoing {
     queue: VecDeque<(Frame, Option<Ticket>)>,
@@ -126,8 +135,15 @@ impl Outgoing {
         self.queue.retain(|(_, ticket)| *ticket != Some(removed));
     }
 
-    /// Sends all frames that can be sent now, and calls `sent` for each frame of a transfer, with a moment before and
-    /// one after sending. `now` may be earlier than the present moment unless [`Outgoing::needs_time`]. Returns when to try again if frames are left.
+    /// Drops all frames because no node acknowledges. They would be sent too late.
+    fn drop_all(&mut self, now: Mono, sent: &mut dyn FnMut(Ticket, SendTime)) {
+        (self.first, self.full_since) = (None, None);
+        let dropped = SendTime { before: now, after: Some(now) };
+        self.queue.drain(..).filter_map(|(_, ticket)| ticket).for_each(|ticket| sent(ticket, dropped));
+    }
+
+    /// Sends all frames that can be sent now, and calls `sent` for each frame of a transfer. `now` may be earlier than
+    /// the present moment unless [`Outgoing::needs_time`]. Returns when to try again if frames are left.
     ///
     /// # Errors
     /// An error of the bus, or a transmit queue that stays full for `queue_timeout` (at least one second). With
@@ -137,12 +153,13 @@ impl Outgoing {
         bus: &mut dyn Bus,
         now: Mono,
         queue_timeout: Duration,
-        sent: &mut dyn FnMut(Ticket, [Mono; 2]),
+        sent: &mut dyn FnMut(Ticket, SendTime),
     ) -> Result<Option<Mono>, BusError> {
         if self.queue.len() > MAX_QUEUED_FRAMES as usize && self.bit_rate.is_none() {
             self.bit_rate = Some(bus.bit_rate().filter(|&rate| rate > 0));
         }
         let bit_rate = self.bit_rate.flatten();
+        let reads_clock = self.needs_time() || !bus.waits_without_clock();
         while let Some((frame, ticket)) = self.queue.front() {
             if let Some(bit_rate) = bit_rate {
                 let longest = bit_time(LONGEST_FRAME_BITS, bit_rate);
@@ -161,10 +178,7 @@ impl Outgoing {
                     if !self.tolerates_outages {
                         return Err(BusError::QueueFull);
                     }
-                    // No node acknowledges. The waiting frames are dropped, because they would be sent too late.
-                    self.first = None;
-                    self.queue.drain(..).filter_map(|(_, ticket)| ticket).for_each(|ticket| sent(ticket, [now; 2]));
-                    self.full_since = None;
+                    self.drop_all(now, sent);
                     return Ok(None);
                 }
                 Err(BusError::Down(_) | BusError::NoInterface(_)) if self.tolerates_outages => is_accepted = false,
@@ -179,7 +193,9 @@ impl Outgoing {
             }
             if let Some(ticket) = ticket {
                 // On a bus that several procedures share (`bus::parallel`), sending may wait: the clock is read again.
-                sent(*ticket, [now, bus.mono()]);
+                // The time-out starts after the last frame.
+                let is_last = self.queue.get(1).is_none_or(|(_, next)| next != &Some(*ticket));
+                sent(*ticket, SendTime { before: now, after: (reads_clock && is_last).then(|| bus.mono()) });
             }
             // Uses the length of this frame. With the longest length, a long burst would be slower than the bus.
             if let Some(bit_rate) = bit_rate {

@@ -31,6 +31,9 @@ pub const LARGE: u32 = 889;
 /// The interval between two progress reports of a transfer.
 const REPORT_INTERVAL: Duration = Duration::from_millis(250);
 
+/// The longest delay of a progress report. Before a deadline that is near, each wait needs more system calls.
+const REPORT_DELAY: Duration = Duration::from_millis(50);
+
 /// When block transfer is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BlockMode {
@@ -175,7 +178,7 @@ impl Master<'_> {
         let mut report_at = self.seen + REPORT_INTERVAL;
         let mut has_updated_clock = false;
         loop {
-            match self.next(report_at)? {
+            match self.next_or(report_at + REPORT_DELAY, report_at)? {
                 MasterEvent::Sdo(ended, result) if ended == ticket => {
                     if operation == Operation::Read {
                         self.await_second_answers(watch)?;

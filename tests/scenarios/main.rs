@@ -5,6 +5,7 @@ mod assign;
 mod bit_rates;
 mod config;
 mod conform;
+mod costly_clock;
 mod detect;
 mod doctor;
 mod full_queue;

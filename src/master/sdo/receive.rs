@@ -153,7 +153,7 @@ impl ActiveTransfer {
             // A segment of a block: each segment has its own time-out.
             Progress::Continue if out.is_empty() => {
                 if self.unsent == 0 {
-                    self.deadline = Some(at + self.timeout(context.timing));
+                    (self.deadline, self.read_clock_at) = (Some(at + self.timeout(context.timing)), None);
                 }
                 Step::Continued
             }
