@@ -5,6 +5,7 @@
 //! clock is read once for all of them. The program waits for the socket only after the socket was found empty.
 
 mod clocks;
+mod convert;
 mod faults;
 mod interfaces;
 mod netlink;
@@ -21,6 +22,7 @@ use super::{
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use clocks::Clocks;
+use convert::{from_kernel, to_kernel};
 pub use interfaces::{Interface, interfaces};
 pub use netlink::{BitTiming, Link, State};
 use receive::{Batch, Message};
@@ -39,6 +41,8 @@ const LINK_CHECK_INTERVAL: Duration = Duration::from_millis(200);
 /// system call instead of four.
 const ANSWER_TIME: Duration = Duration::from_millis(10);
 
+/// The clock is read before each wait if the deadline is nearer than this.
+const NEAR_DEADLINE: Duration = Duration::from_millis(30);
 /// The number of such waits after a send, if each of them receives a frame: the segments of a block.
 const ANSWERS: u8 = 127;
 
@@ -178,8 +182,8 @@ impl SocketCan {
     }
 
     /// Reads the frames that the kernel holds for this socket.
-    /// If `wait` is set, waits up to [`ANSWER_TIME`] for the first frame.
-    fn fill(&mut self, wait: bool) -> Result<(), BusError> {
+    /// If `wait` is set, waits up to [`ANSWER_TIME`] for the first frame. Returns whether there was a frame.
+    fn fill(&mut self, wait: bool) -> Result<bool, BusError> {
         match self.batch.fill(self.socket.as_fd(), wait) {
             Ok(count) => {
                 self.is_drained = count < receive::BATCH;
@@ -189,22 +193,27 @@ impl SocketCan {
                 } else {
                     self.clocks.batch(self.mono(), self.is_drained);
                 }
-                Ok(())
+                Ok(true)
             }
             Err(error) => match error.raw_os_error() {
                 Some(libc::EAGAIN) => {
-                    (self.is_drained, self.expected_answers) = (true, 0);
-                    Ok(())
+                    self.is_drained = true;
+                    if wait {
+                        // Such waits go on if a sender only pauses. The clock is read, so that they end before the deadline.
+                        self.expected_answers = self.expected_answers.saturating_sub(ANSWERS / 4);
+                        self.mono();
+                    }
+                    Ok(false)
                 }
-                Some(libc::EINTR) => Ok(()),
+                Some(libc::EINTR) => Ok(false),
                 // The kernel reports this once. The socket stays bound and works again when the interface is up.
                 Some(libc::ENETDOWN) => {
                     self.set_is_up(false);
-                    Ok(())
+                    Ok(false)
                 }
                 Some(libc::ENODEV | libc::ENXIO) => {
                     self.lose_interface();
-                    Ok(())
+                    Ok(false)
                 }
                 _ => Err(self.error("receive from", error)),
             },
@@ -213,7 +222,10 @@ impl SocketCan {
 
     /// Waits for a frame, a signal or the deadline. Returns whether the deadline was reached without an event.
     fn wait(&mut self, deadline: Mono) -> Result<bool, BusError> {
-        let left = deadline.since(self.mono());
+        // The latest known moment may be too early, so only half of the time is used. On some machines, reading the clock
+        // takes as long as receiving a frame.
+        let estimate = deadline.since(self.latest());
+        let left = if estimate > NEAR_DEADLINE { estimate / 2 } else { deadline.since(self.mono()) };
         let limit = if self.is_up { left } else { left.min(LINK_CHECK_INTERVAL) };
         // A socket without an interface receives nothing.
         let ready = if self.is_removed {
@@ -283,6 +295,41 @@ impl SocketCan {
             },
         }
         Ok(())
+    }
+
+    /// Waits for the next event until the deadline. Without a deadline, waits up to [`ANSWER_TIME`] after the last send.
+    fn receive_until(&mut self, deadline: Option<Mono>) -> Result<Option<Event>, BusError> {
+        let mut has_discarded = false;
+        loop {
+            if self.interrupts.take() {
+                return Ok(Some(Event::Interrupted));
+            }
+            if let Some(event) = self.ready.pop_front() {
+                return Ok(Some(event));
+            }
+            if let Some(message) = self.batch.next() {
+                match self.process(message) {
+                    Some(event) => return Ok(Some(event)),
+                    None => has_discarded = true,
+                }
+                continue;
+            }
+            // Frames that are filtered out must not extend the deadline.
+            if has_discarded && deadline.is_none_or(|deadline| self.last_frame_at > deadline) {
+                return Ok(None);
+            }
+            let allows_wait = deadline.is_none_or(|deadline| deadline.since(self.latest()) > ANSWER_TIME * 3);
+            if !self.is_drained {
+                self.fill(false)?;
+            } else if self.expected_answers > 0 && self.is_up && allows_wait {
+                self.expected_answers -= 1;
+                if !self.fill(true)? && deadline.is_none() {
+                    return Ok(None);
+                }
+            } else if deadline.map_or(Ok(true), |deadline| self.wait(deadline))? {
+                return Ok(None);
+            }
+        }
     }
 
     /// Processes a message. Returns the frame if no other event precedes it; otherwise queues all events in order.
@@ -409,32 +456,16 @@ impl Bus for SocketCan {
         })
     }
 
+    fn waits_without_clock(&self) -> bool {
+        true
+    }
+
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
-        let mut has_discarded = false;
-        loop {
-            if self.interrupts.take() {
-                return Ok(Event::Interrupted);
-            }
-            if let Some(event) = self.ready.pop_front() {
-                return Ok(event);
-            }
-            if let Some(message) = self.batch.next() {
-                match self.process(message) {
-                    Some(event) => return Ok(event),
-                    None => has_discarded = true,
-                }
-            } else if has_discarded && self.last_frame_at > deadline {
-                // Frames that are filtered out must not extend the deadline.
-                return Ok(Event::Timeout);
-            } else if !self.is_drained {
-                self.fill(false)?;
-            } else if self.expected_answers > 0 && self.is_up && deadline.since(self.latest()) > ANSWER_TIME * 3 {
-                self.expected_answers -= 1;
-                self.fill(true)?;
-            } else if self.wait(deadline)? {
-                return Ok(Event::Timeout);
-            }
-        }
+        self.receive_until(Some(deadline)).map(|event| event.unwrap_or(Event::Timeout))
+    }
+
+    fn receive_answer(&mut self) -> Result<Option<Event>, BusError> {
+        self.receive_until(None)
     }
 }
 
@@ -446,31 +477,4 @@ pub(super) fn primary_name(name: &str) -> Option<String> {
 
 fn now(opened: Instant) -> Stamp {
     Stamp { mono: Mono::at(opened.elapsed()), wall: Wall::now() }
-}
-
-fn to_kernel(frame: &Frame) -> CanFrame {
-    let mut raw = socketcan::frame::can_frame_default();
-    raw.can_id = match frame.id() {
-        CanId::Standard(id) => u32::from(id),
-        CanId::Extended(id) => id | libc::CAN_EFF_FLAG,
-    };
-    if frame.is_remote() {
-        raw.can_id |= libc::CAN_RTR_FLAG;
-    }
-    raw.can_dlc = frame.len();
-    raw.data[..frame.data().len()].copy_from_slice(frame.data());
-    CanFrame::from(raw)
-}
-
-/// Returns `None` if `raw` is not a classic data or remote frame.
-fn from_kernel(raw: &libc::can_frame) -> Option<Frame> {
-    let id = if raw.can_id & libc::CAN_EFF_FLAG != 0 {
-        CanId::extended(raw.can_id & libc::CAN_EFF_MASK)?
-    } else {
-        CanId::standard(u16::try_from(raw.can_id & libc::CAN_SFF_MASK).ok()?)?
-    };
-    if raw.can_id & libc::CAN_RTR_FLAG != 0 {
-        return Frame::remote(id, raw.can_dlc).ok();
-    }
-    Frame::new(id, raw.data.get(..usize::from(raw.can_dlc))?).ok()
 }
