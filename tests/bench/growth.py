@@ -66,7 +66,7 @@ def latency(directory):
         report("latency", line, far, "s", f"without latency {near:.3f} s; waits", (far - near) * 1000 / LATENCY_MS)
 
 
-def growth(directory):
+def growth(directory, largest=7):
     """growth of cost with nodes, frames and expressions"""
     for nodes in (1, 4, 16, 64, 127):
         devices = [f'kind = "mh4"\nnode = {node}' for node in range(1, nodes + 1)]
@@ -81,7 +81,7 @@ def growth(directory):
         report("growth", f"log, {nodes} nodes, first complete cycle", first, "s", "per node, ms", first * 1000 / nodes)
     recording = os.path.join(directory, "frames.log")
     setup = [frame for _, frame in Traced(directory, ['kind = "dps"\nnode = 1'], "log", "1", "--duration", "1s").frames]
-    for exponent in (3, 4, 5, 6, 7):
+    for exponent in range(3, largest + 1):
         write_recording(recording, setup, 10**exponent)
         log = [BINARY, "-q", "-b", "replay:" + recording, "log", "1", "--passive", "-o", os.path.join(directory, "rows"), "--force"]
         took, memory = measured(log)
