@@ -15,7 +15,7 @@ fn known_deviations_are_named_with_their_page_and_are_no_failure() {
     assert!(done.stdout.starts_with("SDO-01  pass        A read of 1000h"), "{}", done.stdout);
     let skipped = "not applicable: SDO-30 to SDO-36 (the device has no block transfer)\n";
     assert!(done.stdout.contains(skipped) && !done.stdout.contains("not-applicable"), "{}", done.stdout);
-    let without_eds = "not applicable: EDS-01 to EDS-17, EDS-19, EDS-20 (not run without --eds)\n";
+    let without_eds = "not applicable: EDS-01 to EDS-17, EDS-19 to EDS-21 (not run without --eds)\n";
     assert!(done.stdout.contains(without_eds), "{}", done.stdout);
     let count = format!("node 1: {} cases in", cases().count());
     assert!(done.stderr.contains(&count), "{}", done.stderr);
@@ -116,7 +116,7 @@ fn eds_file_is_compared_with_the_device() {
     assert!(done.stdout.contains("        0x1018:1: expected 72 (0x48); seen: 71\n"), "{}", done.stdout);
     let done = bench.run("conform 1 --only eds").exit(0);
     done.prints(
-        "not applicable: EDS-01 to EDS-17, EDS-19, EDS-20 (not run without --eds)\n\
+        "not applicable: EDS-01 to EDS-17, EDS-19 to EDS-21 (not run without --eds)\n\
          not applicable: EDS-18 (not run without --store)\n",
     );
 }

@@ -3,6 +3,7 @@
 mod limits;
 mod mapping;
 mod objects;
+mod structure;
 mod values;
 
 use super::case::{Area, Case, Run, Severity::*};
@@ -81,6 +82,13 @@ pub(super) const CASES: &[Case] = &[
         .matters(High, "Masters that map the object fail."),
     case("EDS-20", "Objects that the file does not call mappable cannot be mapped", MAPPING, mapping::not_mappable)
         .matters(Low, "A wrong mapping is not noticed."),
+    case(
+        "EDS-21",
+        "Sub-index 255 of an object, if there is one, contains the data type of the file",
+        "CiA 301, sub-index 255",
+        structure::types,
+    )
+    .matters(Low, "Tools that read the data types from the device decode values wrongly."),
 ];
 
 /// The objects that each device has.

@@ -92,4 +92,11 @@ pub(super) const EDS: &[EdsRow] = &[
         &[],
         Some(Answers(|_, request| is(request, &[0x23, 0x00, 0x1a, 1, 0x10, 0, 0x17, 0x10]).then(|| ack(request)))),
     ),
+    // An UNSIGNED8 in place of an UNSIGNED16.
+    (
+        "mh4",
+        "EDS-21",
+        &[],
+        Some(Answers(|_, request| is(request, &[0x40, 0x17, 0x10, 255]).then(|| reply(0x43, request, [7, 5, 0, 0])))),
+    ),
 ];

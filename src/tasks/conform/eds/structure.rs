@@ -1,0 +1,50 @@
+//! Sub-index 255 of objects: the object code and the data type.
+
+use super::super::finding::{Expected, Finding, Seen, Verdict};
+use super::super::session::Session;
+use super::{NO_FILE, file};
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::node::Error;
+use std::collections::BTreeMap;
+
+/// Object codes.
+const VAR: u64 = 7;
+const ARRAY: u64 = 8;
+const RECORD: u64 = 9;
+
+const STRUCTURE: u8 = 255;
+
+pub(super) fn types(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+    let Some(eds) = file(session) else { return Ok(NO_FILE) };
+    let mut objects: BTreeMap<u16, Vec<(u8, DataType)>> = BTreeMap::new();
+    for entry in eds.dictionary.iter().filter(|entry| !eds.untyped.contains(&entry.object)) {
+        objects.entry(entry.object.index).or_default().push((entry.object.sub, entry.data_type));
+    }
+    let mut findings = Vec::new();
+    for (index, subs) in objects {
+        let object = ObjectId::new(index, STRUCTURE);
+        let Some(found) = session.read(object)?.filter(|bytes| bytes.len() == 4) else { continue };
+        // SDO-05 reports a device that ignores the sub-index.
+        if session.read(object.with_sub(0))?.is_some_and(|value| value == found) {
+            continue;
+        }
+        findings.extend(wrong_part(object, &subs, &found));
+    }
+    Ok(Verdict::of(findings))
+}
+
+/// The finding if the object code or the data type differs from the file.
+fn wrong_part(object: ObjectId, subs: &[(u8, DataType)], found: &[u8]) -> Option<Finding> {
+    let (code, type_code) = (u64::from(found[0]), u16::from(found[1]));
+    let is_variable = matches!(subs, [(0, _)]);
+    let (low, high) = if is_variable { (VAR, VAR) } else { (ARRAY, RECORD) };
+    if !(low..=high).contains(&code) {
+        return Some(Finding::at(object, Expected::Range(low, high), Seen::Number(code)));
+    }
+    // The types of records have no basic code.
+    let (_, expected) = *subs.iter().find(|(sub, _)| is_variable || code == ARRAY && (1..STRUCTURE).contains(sub))?;
+    let shown = DataType::from_code(type_code);
+    let seen = || shown.map_or(Seen::Number(type_code.into()), Seen::Type);
+    (shown != Some(expected)).then(|| Finding::at(object, Expected::Type(expected), seen()))
+}
