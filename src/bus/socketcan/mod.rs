@@ -165,8 +165,8 @@ impl SocketCan {
         let result = work(&self.name, &mut || {
             ready.clear();
             // Read twice: the first loop may end at the error "interface is down", which is reported only once.
-            while batch.fill(socket, false).is_ok() {}
-            while batch.fill(socket, false).is_ok() {}
+            while batch.fill(socket, false, receive::BATCH).is_ok() {}
+            while batch.fill(socket, false, receive::BATCH).is_ok() {}
         });
         // Clears the error of the socket: if the bit rate is not supported, the interface may have gone down again.
         let _ = self.socket.as_raw_socket().take_error();
@@ -184,7 +184,9 @@ impl SocketCan {
     /// Reads the frames that the kernel holds for this socket.
     /// If `wait` is set, waits up to [`ANSWER_TIME`] for the first frame. Returns whether there was a frame.
     fn fill(&mut self, wait: bool) -> Result<bool, BusError> {
-        match self.batch.fill(self.socket.as_fd(), wait) {
+        // Often there is only one answer: then reading one frame is faster.
+        let most = if wait && self.expected_answers == ANSWERS - 1 { 1 } else { receive::BATCH };
+        match self.batch.fill(self.socket.as_fd(), wait, most) {
             Ok(count) => {
                 self.is_drained = count < receive::BATCH;
                 if wait {
