@@ -221,6 +221,19 @@ fn measured_times_are_those_of_the_device() {
     assert!(figure(&report, "TIM-05", Statistic::Max) >= Duration::from_millis(40));
 }
 
+/// The writes of this device take so long that the process value crosses a limit meanwhile.
+#[test]
+fn value_that_crosses_a_limit_by_itself_is_no_deviation() {
+    let (_, _, deviation) = *table::SDO.iter().find(|(_, case, _)| *case == "SDO-20").expect("the row");
+    let options = ConformOptions { only: vec![Area::Cia404], ..ConformOptions::default() };
+    for start in [0, 5, 9] {
+        let mut bus = bus("mh4", Some(deviation));
+        let until = Mono::at(Duration::from_secs(start));
+        while bus.receive(until).expect("the bus works") != Event::Timeout {}
+        assert_eq!(deviations(&run(&mut bus, "mh4", &options).expect("a report")), [], "from {start} s");
+    }
+}
+
 #[test]
 fn other_nodes_are_a_reason_to_refuse() {
     let mut bus = bus("mh4", None);

@@ -187,6 +187,7 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::Rejected(object, code) => format!("{object}: the device rejected the write: {code}"),
         WhyNot::NotMoved(object) => format!("{object} did not change enough"),
         WhyNot::StepTooSlow => "the step of the input takes longer than the filter".to_owned(),
+        WhyNot::MovedEarly(object) => format!("{object} crossed the limit too early, by itself"),
         WhyNot::NearZero(object) => format!("{object} is too close to zero"),
         WhyNot::NoValidValue(object) => format!("{object} is not valid, or at the end of its range"),
         WhyNot::NoStimulus => "not run without --stimulus".to_owned(),

@@ -247,6 +247,8 @@ pub enum WhyNot {
     NotMoved(ObjectId),
     /// The step of the input takes longer than the response that it causes.
     StepTooSlow,
+    /// The process value has crossed the limit by itself, before the case moved it.
+    MovedEarly(ObjectId),
     /// The process value is so small that both expected values are the same.
     NearZero(ObjectId),
     /// The process value is not valid, or at the end of its range.

@@ -260,6 +260,11 @@ fn limit(session: &mut Session<'_, '_>, distance: u16, direction: f64) -> Result
         Err(verdict) => return Ok(verdict),
     };
     let limit = events.present.middle() + 2.0 * direction * events.change;
+    let is_beyond = |now: Readings| (now.middle() - limit) * direction > 0.0;
+    // The value may have crossed the limit while the parameters were written.
+    if session.readings(events.value, events.data_type, events.digits)?.is_none_or(is_beyond) {
+        return Ok(Verdict::not_judged(WhyNot::MovedEarly(events.value)));
+    }
     let count = count_after_move(session, &events, MOVE * direction * events.change)?;
     let is_far = |now: Readings| (now.middle() - limit) * direction > events.change;
     judge(session, &events, distance, count, is_far)
