@@ -26,10 +26,12 @@ use stimulus::StimulusCommand;
 /// manual of the device documents is reported as known. The cases of the area "timing" print measured times and no verdict.
 ///
 /// The device should be alone on the bus. If other nodes or other traffic are seen, only the areas can be checked that
-/// send nothing to other nodes: --only with all areas except pdo and lss. The command writes only objects of 1000h to 1FFFh and settings of the device profile. Afterwards all
-/// settings and the NMT state are as before. With --store, the command also stores settings, restores factory
-/// defaults, sets the present node-ID by LSS, and executes and undoes autozero. At the end it stores the settings that
-/// the device had at the start.
+/// send nothing to other nodes: --only with all areas except pdo and lss. The command writes only objects of 1000h to
+/// 1FFFh and settings of the device profile. Afterwards all settings and the NMT state are as before.
+///
+/// With --store, the command also stores settings, restores factory defaults, stores the present node-ID and bit rate
+/// by LSS, sets other bit rates by LSS, and executes and undoes autozero. No bit rate is activated, and the present one
+/// is set again. At the end the command stores the settings that the device had at the start.
 ///
 /// With --eds FILE, the EDS or DCF file is also checked against CiA 306 and compared with the device: existence, size,
 /// access, limits and mapping of each object, and with --store its defaults.
@@ -81,7 +83,7 @@ pub(crate) struct Conform {
     /// Do not run these cases: SDO-07,SDO-22. Can be repeated
     #[arg(long, value_name = "CASE", value_delimiter = ',', value_parser = parse_case)]
     skip: Vec<String>,
-    /// Also run the cases that write to non-volatile memory, set the node-ID or execute autozero
+    /// Also run the cases that write to non-volatile memory, set the node-ID or the bit rate, or execute autozero
     #[arg(long)]
     store: bool,
     /// Run the cases that need another input of the device. The shell command CMD sets the input: it is run with the

@@ -10,7 +10,7 @@ pub use record::ConformRecord;
 pub use skipped::write_skipped;
 pub use words::finding;
 use words::page;
-pub(in crate::output) use words::stimulus_failure;
+pub(in crate::output) use words::{lss_setting, stimulus_failure};
 
 use super::report::{Cell, Column, Report};
 use super::text;
@@ -175,6 +175,7 @@ pub fn left(report: &ConformReport) -> Option<String> {
     let left: Vec<String> = (!report.not_restored.is_empty())
         .then(objects)
         .into_iter()
+        .chain(report.lss_not_restored.iter().map(|setting| lss_setting(*setting)))
         .chain((report.state == StateAfter::Unknown).then(state))
         .chain(report.history.as_ref().map(super::failure::conform::history_left))
         .chain(report.input_failure.as_ref().map(super::failure::conform::input_left))

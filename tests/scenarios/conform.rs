@@ -10,7 +10,8 @@ mod table_more;
 use super::pdo_map::{Fault, FaultyBus};
 use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::bus::{Bus, Event, Mono};
-use cangauge::canopen::id::NodeId;
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
 use cangauge::device::catalog::{Model, by_name};
 use cangauge::device::eds::Eds;
@@ -21,7 +22,9 @@ use cangauge::output::conform::finding;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Setup, State};
 use cangauge::tasks::config::{Journal, Snapshot};
-use cangauge::tasks::conform::{Area, ConformOptions, ConformReport, Input, Needs, Statistic, Verdict, cases, conform};
+use cangauge::tasks::conform::{
+    Area, ConformOptions, ConformReport, Input, LssSetting, Needs, Statistic, Verdict, WhyNot, cases, conform,
+};
 use cangauge::tasks::{Failure, Kind};
 use deviant::{Deviant, Deviation, NODE, Switch};
 use eds_text::eds_text;
@@ -54,8 +57,12 @@ fn model(kind: &str) -> Arc<Model> {
 }
 
 fn bus(kind: &str, deviation: Option<Deviation>) -> MemoryBus {
+    bus_at(250_000, kind, deviation)
+}
+
+fn bus_at(bit_rate: u32, kind: &str, deviation: Option<Deviation>) -> MemoryBus {
     Switch::reset();
-    let mut bus = MemoryBus::new(Clock::Virtual);
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(bit_rate);
     let mut setup = Setup::new(model(kind), node());
     if kind == "large" {
         setup.set.push((ObjectId::new(0x1018, 1), Scalar::Integer(71)));
@@ -98,14 +105,15 @@ fn deviations(report: &ConformReport) -> Vec<(&'static str, Vec<String>)> {
     .collect()
 }
 
-/// The value of each writable object, and the NMT state.
-type Contents = (BTreeMap<ObjectId, Vec<u8>>, Option<State>);
+/// The value of each writable object, the NMT state, and the stored node-ID and bit rate.
+type Contents = (BTreeMap<ObjectId, Vec<u8>>, Option<State>, (Option<NodeId>, Option<u32>));
 
 fn differences(bus: &mut MemoryBus, before: &Contents) -> Vec<String> {
-    let (values, state) = contents(bus);
+    let (values, state, stored) = contents(bus);
     let changed = values.into_iter().filter(|(object, value)| before.0.get(object) != Some(value));
     let state = (state != before.1).then(|| format!("{state:?}"));
-    changed.map(|(object, value)| format!("{object} {value:02x?}")).chain(state).collect()
+    let stored = (stored != before.2).then(|| format!("stored: {stored:?}"));
+    changed.map(|(object, value)| format!("{object} {value:02x?}")).chain(state).chain(stored).collect()
 }
 
 fn contents(bus: &mut MemoryBus) -> Contents {
@@ -114,7 +122,7 @@ fn contents(bus: &mut MemoryBus) -> Contents {
     let writable = station.model.dictionary.iter().filter(|entry| entry.access.is_writable());
     let objects: Vec<ObjectId> = writable.map(|entry| entry.object).collect();
     let values = objects.into_iter().filter_map(|object| Some((object, station.device.value(object, now)?))).collect();
-    (values, station.device.state())
+    (values, station.device.state(), station.device.stored())
 }
 
 #[test]
@@ -123,7 +131,7 @@ fn simulated_devices_have_only_the_deviations_of_their_manuals() {
         ("mh4", &[("OD-05", "4.1.8, 4.1.9, 4.2.4, 4.2.5")][..]),
         ("d20", &[("SDO-08", "7"), ("SDO-09", "7"), ("OD-05", "16"), ("PDO-20", "6")]),
         ("mc1609", &[("404-33", "2.2, Filter")]),
-        ("dps", &[("SDO-08", "table 23"), ("SDO-09", "table 23")]),
+        ("dps", &[("SDO-08", "table 23"), ("SDO-09", "table 23"), ("LSS-26", "table 7")]),
         ("hydac", &[]),
         ("large", &[]),
     ];
@@ -250,14 +258,75 @@ fn other_nodes_are_a_reason_to_refuse() {
     assert_eq!(deviations(&report), []);
 }
 
+#[test]
+fn lss_setting_that_could_not_be_restored_is_named_and_never_active() {
+    // The device accepts the node-ID 128, and no other one afterwards.
+    let deviation = Deviation::Sends(|memory, frame| {
+        let is_answer = frame.id() == CanId::LSS_SLAVE && frame.data().first() == Some(&0x11);
+        if !is_answer || memory.count == 0 && memory.lss[1] != 128 {
+            return vec![frame];
+        }
+        memory.count += 1;
+        vec![Frame::full(frame.id(), [0x11, u8::from(memory.count > 1), 0, 0, 0, 0, 0, 0])]
+    });
+    let mut bus = FaultyBus::new(bus("mh4", Some(deviation)), Fault::None, 0);
+    let options = ConformOptions { only: vec![Area::Lss, Area::Timing], store: true, ..ConformOptions::default() };
+    let report = run(&mut bus, "mh4", &options).expect("a report");
+    assert_eq!(report.lss_not_restored, [LssSetting::NodeId]);
+    assert_eq!(deviations(&report).iter().map(|(case, _)| *case).collect::<Vec<_>>(), ["LSS-20"]);
+    let later = report.results.iter().skip_while(|result| result.case.id != "LSS-21");
+    assert!(later.clone().count() > 10);
+    for result in later {
+        assert!(matches!(&result.verdict, Verdict::NotJudged(why) if matches!(**why, WhyNot::LssNotRestored(_))));
+    }
+    let left =
+        "the old node-ID could not be set again by LSS: a reset may activate another one, a power cycle restores it";
+    assert_eq!(cangauge::output::conform::left(&report).as_deref(), Some(left));
+    let accepted =
+        bus.sent.iter().rposition(|frame| frame.data() == [0x11, 128, 0, 0, 0, 0, 0, 0]).expect("the request");
+    let is_reset = |frame: &Frame| frame.id() == CanId::NMT && matches!(frame.data(), [0x81 | 0x82, ..]);
+    assert!(!bus.sent[accepted..].iter().any(is_reset));
+}
+
+#[test]
+fn bit_rate_that_could_not_be_set_again_is_not_changed() {
+    let accepts_detection = Deviation::Sends(|memory, frame| {
+        let is_answer = frame.id() == CanId::LSS_SLAVE && memory.lss[..3] == [0x13, 0, 9];
+        let answer = Frame::full(CanId::LSS_SLAVE, [0x13, 0, 0, 0, 0, 0, 0, 0]);
+        vec![if is_answer { answer } else { frame }]
+    });
+    let options = ConformOptions { only: vec![Area::Lss], store: true, ..ConformOptions::default() };
+    let sent_and_why = |bit_rate, kind, deviation| {
+        let mut bus = FaultyBus::new(bus_at(bit_rate, kind, deviation), Fault::None, 0);
+        let report = run(&mut bus, kind, &options).expect("a report");
+        let result = report.results.into_iter().find(|result| result.case.id == "LSS-27").expect("the case");
+        let codes = bus.sent.iter().filter_map(|frame| match frame.data() {
+            [0x13, 0, code, ..] if frame.id() == CanId::LSS_MASTER => Some(*code),
+            _ => None,
+        });
+        let reason = match result.verdict {
+            Verdict::NotApplicable(why) => format!("{why:?}"),
+            Verdict::NotJudged(why) => format!("{why:?}"),
+            other => format!("{other:?}"),
+        };
+        (codes.collect::<Vec<_>>(), reason)
+    };
+    // The MH-4 can detect the bit rate; 100 kbit/s has no code. The reserved codes come from LSS-26.
+    let detects = |was_set| format!("DetectsBitRate {{ was_set: {was_set} }}");
+    assert_eq!(sent_and_why(250_000, "mh4", None), (vec![5, 10, 255], detects(false)));
+    assert_eq!(sent_and_why(100_000, "mc1609", None), (vec![], "UnknownBitRate".to_owned()));
+    let (codes, why) = sent_and_why(250_000, "mc1609", Some(accepts_detection));
+    assert_eq!((codes, why), (vec![5, 10, 255, 9, 3], detects(true)));
+}
+
 /// Ctrl-C after some frames of each area. The device has its old settings and its old state.
 #[test]
 fn an_interrupted_check_restores_the_device() {
     for area in Area::ALL {
         for kind in ["mh4", "d20", "mc1609", "dps"] {
             let step = if kind == "mh4" { 9 } else { 83 };
-            let wrong =
-                interrupted(kind, area, area == Area::Eds, |count| (SEARCH..count).step_by(step.max(count / 60)));
+            let store = matches!(area, Area::Eds | Area::Lss);
+            let wrong = interrupted(kind, area, store, |count| (SEARCH..count).step_by(step.max(count / 60)));
             assert_eq!(wrong, [""; 0]);
         }
     }
@@ -364,6 +433,10 @@ fn interrupted(kind: &str, area: Area, store: bool, chosen: impl Fn(usize) -> Fr
         let mut bus = faulty.bus;
         run_on(&mut bus);
         let mut found = differences(&mut bus, &before);
+        let station = bus.stations_mut::<Deviant>().next().expect("the device");
+        if station.device.is_configuring() || !station.has_old_address() {
+            found.push("the device has another node-ID or bit rate, or is in configuration state".to_owned());
+        }
         bus.power_cycle();
         run_on(&mut bus);
         found.extend(differences(&mut bus, &before).into_iter().map(|one| format!("after a power cycle: {one}")));

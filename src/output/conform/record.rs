@@ -33,6 +33,8 @@ impl ConformRecord<'_> {
     /// One JSON object. `conform diff` reads it.
     pub fn json(&self) -> String {
         let (node, report) = (&self.report.node, self.report);
+        let settings = report.lss_not_restored.iter().map(|setting| format!("{} (LSS)", setting.name()));
+        let not_restored: Vec<String> = report.not_restored.iter().map(ToString::to_string).chain(settings).collect();
         let record = json!({
             "time": self.time(),
             "tool": "cangauge",
@@ -47,7 +49,7 @@ impl ConformRecord<'_> {
             "revision": node.identity.revision,
             "serial": node.identity.serial,
             "seconds": report.length.as_secs_f64(),
-            "not_restored": report.not_restored.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            "not_restored": not_restored,
             "error_history": report.history.map(|change| json!({
                 "before": change.before.count,
                 "after": change.after.count,

@@ -4,7 +4,7 @@ use crate::bus::time::format_duration;
 use crate::device::scalar::Scalar;
 use crate::output::failure::ErrorMessage;
 use crate::output::text::spaced_bytes;
-use crate::tasks::conform::{Expected, Figure, Finding, Seen, Statistic, StimulusFailure, WhyNot};
+use crate::tasks::conform::{Expected, Figure, Finding, LssSetting, Seen, Statistic, StimulusFailure, WhyNot};
 use std::time::Duration;
 
 /// A finding in one line: the object, what was expected, and what was seen.
@@ -85,6 +85,9 @@ fn expected(expected: &Expected) -> String {
         Expected::Refused => "an abort or an error code".to_owned(),
         Expected::Acknowledged => "an acknowledgement".to_owned(),
         Expected::Service(service) => format!("an answer with service {service:02X}h"),
+        Expected::LssErrorCode => "an answer with service 13h and error code 0, 1 or 255".to_owned(),
+        Expected::RateCode { code, is_accepted: true } => format!("an acknowledgement of bit rate code {code}"),
+        Expected::RateCode { code, is_accepted: false } => format!("a rejection of bit rate code {code}"),
         Expected::Number(number) => format!("{number} (0x{number:X})"),
         Expected::AtLeast(time) => format!("at least {}", duration(*time)),
         Expected::NoError => "an emergency with code 0000h".to_owned(),
@@ -178,6 +181,19 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::NoError => "the device has no error, and a SYNC of eight bytes causes none".to_owned(),
         WhyNot::NoLss => "the device does not answer LSS".to_owned(),
         WhyNot::NoService(service) => format!("the device does not answer LSS service {service:02X}h"),
+        WhyNot::LssRejected(service) => format!("the device rejects LSS service {service:02X}h"),
+        WhyNot::UnknownBitRate => "not run, because the bit rate of the bus is unknown".to_owned(),
+        WhyNot::DetectsBitRate { was_set: false } => {
+            "not run, because the device can detect the bit rate: this setting cannot be read, and would be lost"
+                .to_owned()
+        }
+        WhyNot::DetectsBitRate { was_set: true } => {
+            "the device accepts automatic bit rate detection (code 9): if it was active, the present bit rate is used \
+             until the next power-on"
+                .to_owned()
+        }
+        WhyNot::NoBitRates => "the EDS file names no bit rate".to_owned(),
+        WhyNot::LssNotRestored(setting) => format!("not run: {}", lss_setting(*setting)),
         WhyNot::NoEds => "not run without --eds".to_owned(),
         WhyNot::NeedsStore => "not run without --store".to_owned(),
         WhyNot::NoRemoteFrames => "this bus carries no remote frames".to_owned(),
@@ -194,6 +210,12 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::Stimulus(input, failure) => format!("--stimulus {}: {}", input.name(), stimulus_failure(failure)),
         WhyNot::Failed(failure) => ErrorMessage::of(failure).message,
     }
+}
+
+/// A setting that LSS could not set again.
+pub(in crate::output) fn lss_setting(setting: LssSetting) -> String {
+    let name = setting.name();
+    format!("the old {name} could not be set again by LSS: a reset may activate another one, a power cycle restores it")
 }
 
 /// Why the command of `--stimulus` failed.

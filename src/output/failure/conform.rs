@@ -2,7 +2,7 @@
 
 use super::CauseText;
 use crate::canopen::object::ObjectId;
-use crate::output::conform::stimulus_failure;
+use crate::output::conform::{lss_setting, stimulus_failure};
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::conform::{ConformEffect, ConformFailure, HistoryChange, Input, StimulusFailure};
@@ -43,6 +43,10 @@ pub(in crate::output) fn effect(node: &str, effect: &ConformEffect) -> NoteText 
             NoteText::new("not-restored", "the settings could not be restored").command("undo", undo)
         }
         ConformEffect::HistoryChanged(change) => NoteText::new("error-history", history_left(change)),
+        ConformEffect::LssNotRestored(settings) => {
+            let left: Vec<String> = settings.iter().map(|setting| lss_setting(*setting)).collect();
+            NoteText::new("not-restored", left.join("; "))
+        }
         ConformEffect::InputNotNormal(reason) => NoteText::new("input-not-normal", input_left(reason)),
     }
 }

@@ -1,6 +1,7 @@
 //! Why a check of a device was refused or ended early.
 
 use super::history::HistoryChange;
+use super::lss::LssSetting;
 use super::stimulus::StimulusFailure;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
@@ -40,6 +41,8 @@ pub enum ConformEffect {
     Unknown,
     /// The error history is not as before.
     HistoryChanged(HistoryChange),
+    /// LSS has changed these settings, and could not set the old values again.
+    LssNotRestored(Vec<LssSetting>),
     /// The input of the device may not be as before.
     InputNotNormal(StimulusFailure),
 }

@@ -1,6 +1,7 @@
 //! Verdicts: what was expected, and what was seen. The texts are in `output`.
 
 use super::figure::Figure;
+use super::lss::LssSetting;
 use super::stimulus::{Input, StimulusFailure};
 use crate::canopen::frame::Frame;
 use crate::canopen::nmt::NmtState;
@@ -73,6 +74,15 @@ pub enum Expected {
     Acknowledged,
     /// An LSS answer with this service.
     Service(u8),
+    /// An answer of LSS service 13h with an error code of CiA 305.
+    LssErrorCode,
+    /// The result of setting a bit rate by LSS.
+    RateCode {
+        /// The code in table 0.
+        code: u8,
+        /// Whether the device accepts it.
+        is_accepted: bool,
+    },
     /// This number.
     Number(u64),
     /// A number in this range.
@@ -229,6 +239,19 @@ pub enum WhyNot {
     NoLss,
     /// The device does not answer this LSS service.
     NoService(u8),
+    /// The device rejects this LSS service, as it may.
+    LssRejected(u8),
+    /// The bit rate of the bus or its code for LSS is unknown, so that the bit rate could not be set again.
+    UnknownBitRate,
+    /// The device can detect the bit rate. Whether it does cannot be read, so that it could not be set again.
+    DetectsBitRate {
+        /// Whether the case has set the present bit rate. The device uses it until it is switched on again.
+        was_set: bool,
+    },
+    /// The EDS file names no bit rates.
+    NoBitRates,
+    /// An earlier case could not set this setting of LSS again.
+    LssNotRestored(LssSetting),
     /// There is no EDS file.
     NoEds,
     /// The case needs `--store`.

@@ -30,6 +30,7 @@ pub use failure::{ConformEffect, ConformFailure};
 pub use figure::{Figure, Statistic};
 pub use finding::{Expected, Finding, Seen, Verdict, WhyNot};
 pub use history::{ErrorEntries, HistoryChange};
+pub use lss::LssSetting;
 pub use stimulus::{Input, Stimulus, StimulusFailure};
 
 use crate::bus::{Filters, Stamp};
@@ -138,6 +139,8 @@ pub struct ConformReport {
     pub not_restored: Vec<ObjectId>,
     /// The error history, if it is not as before.
     pub history: Option<HistoryChange>,
+    /// Settings that LSS has changed, and whose old values could not be set again.
+    pub lss_not_restored: Vec<LssSetting>,
     /// The NMT state.
     pub state: StateAfter,
     /// Why the input of the device may not be as before.
@@ -161,12 +164,7 @@ pub fn conform(
 ) -> Result<ConformReport, Failure> {
     let (node, before) = read_node(master, id, overrides)?;
     master.listen(&Filters::All)?;
-    let is_local = options.selected().all(|case| case.area.is_local());
-    let is_alone = match alone::others(master, &node)? {
-        None => true,
-        Some(_) if is_local && !options.only.is_empty() => false,
-        Some(failure) => return Err(Failure::at(id, failure)),
-    };
+    let is_alone = is_alone(master, &node, options)?;
     if let Some(before) = &before {
         journal.begin(before)?;
     }
@@ -184,14 +182,25 @@ pub fn conform(
     if restored.as_ref().is_ok_and(Vec::is_empty) {
         journal.finish();
     }
-    let Session { node, input_failure, .. } = session;
+    let Session { node, input_failure, lss_pending, .. } = session;
+    let lss_not_restored = lss_pending.failed;
     let (history, state) = match history {
         Ok(history) => (history, state),
         Err(error) => (None, state.and(Err(error))),
     };
     let failure = match (run, restored, state) {
         (Ok(results), Ok(not_restored), Ok(state)) => {
-            return Ok(ConformReport { node, started, length, results, not_restored, history, state, input_failure });
+            return Ok(ConformReport {
+                node,
+                started,
+                length,
+                results,
+                not_restored,
+                history,
+                lss_not_restored,
+                state,
+                input_failure,
+            });
         }
         (Ok(_), Err(error), _) | (Ok(_), Ok(_), Err(error)) => Failure::from(error).with(id, ConformEffect::Unknown),
         (Err(failure), Ok(objects), _) if objects.is_empty() => failure,
@@ -199,8 +208,22 @@ pub fn conform(
         (Err(failure), Err(_), _) => failure.with(id, ConformEffect::Unknown),
     };
     let of_history = history.map(ConformEffect::HistoryChanged);
-    let effects = of_history.into_iter().chain(input_failure.map(ConformEffect::InputNotNormal));
+    let of_lss = (!lss_not_restored.is_empty()).then_some(ConformEffect::LssNotRestored(lss_not_restored));
+    let effects = of_history.into_iter().chain(of_lss).chain(input_failure.map(ConformEffect::InputNotNormal));
     Err(effects.fold(failure, |failure, effect| failure.with(id, effect)))
+}
+
+/// Whether no other node is on the bus.
+///
+/// # Errors
+/// There are other nodes, and cases that concern them are selected.
+fn is_alone(master: &mut Master<'_>, node: &Node, options: &ConformOptions) -> Result<bool, Failure> {
+    let is_local = options.selected().all(|case| case.area.is_local());
+    match alone::others(master, node)? {
+        None => Ok(true),
+        Some(_) if is_local && !options.only.is_empty() => Ok(false),
+        Some(failure) => Err(Failure::at(node.id, failure)),
+    }
 }
 
 /// Reads the node and its settings. If the settings cannot be read in the form of a file, there is no journal.
@@ -242,6 +265,9 @@ impl Session<'_, '_> {
                 Ok(Verdict::NotApplicable(WhyNot::NotAlone))
             } else if case.needs.needs_store() && !options.store {
                 Ok(Verdict::NotApplicable(WhyNot::NeedsStore))
+            } else if let Some(setting) = self.lss_pending.failed.first() {
+                // A reset would activate it.
+                Ok(Verdict::not_judged(WhyNot::LssNotRestored(*setting)))
             } else {
                 (case.run)(self)
             };

@@ -1,5 +1,6 @@
 //! The node under test, and the requests that the cases use.
 
+use super::lss::PendingSettings;
 use super::settings::Settings;
 use super::stimulus::{Stimulus, StimulusFailure};
 use crate::bus::Received;
@@ -55,6 +56,10 @@ pub(super) struct Session<'s, 'bus> {
     pub(super) wrong_sync: bool,
     /// Whether the node may be in LSS configuration state.
     pub(super) lss_open: bool,
+    /// The NMT command after which the node has answered LSS.
+    pub(super) lss_command: Option<NmtCommand>,
+    /// The node-ID and the bit rate that LSS may have changed.
+    pub(super) lss_pending: PendingSettings,
     /// Whether only a reset of the node restores its settings.
     pub(super) needs_reset: bool,
     /// The sub-indices of 1010h whose stored settings the present case has changed.
@@ -95,6 +100,8 @@ impl<'s, 'bus> Session<'s, 'bus> {
             guarded: false,
             wrong_sync: false,
             lss_open: false,
+            lss_command: None,
+            lss_pending: PendingSettings::default(),
             needs_reset: false,
             stored: Vec::new(),
             is_answer_open: false,

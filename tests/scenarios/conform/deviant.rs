@@ -15,6 +15,9 @@ use std::time::Duration;
 /// The node-ID of the device.
 pub(super) const NODE: u8 = 5;
 
+/// The code of the bit rate of the bus, 250 kbit/s.
+const RATE_CODE: u8 = 3;
+
 /// The facts that a deviation may depend on.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Memory {
@@ -38,6 +41,10 @@ pub(super) struct Memory {
     pub(super) lss: [u8; 8],
     /// Whether the last LSS switch was to configuration state.
     pub(super) is_configuring: bool,
+    /// The node-ID that the device has accepted by LSS, 0 if none.
+    node_id: u8,
+    /// The code of the bit rate that the device has accepted by LSS.
+    bit_rate: Option<u8>,
     /// Counts for the deviation itself.
     pub(super) count: u32,
 }
@@ -83,14 +90,15 @@ pub(super) struct Deviant {
     pub(super) device: Device,
     deviation: Option<Deviation>,
     memory: Memory,
-    input: Input,
+    /// The input that the device has; `None` until the switch has set one.
+    input: Option<Input>,
     /// When the input is compared with that of the switch.
     next_look: Mono,
 }
 
 thread_local! {
-    /// The input of the devices of this test.
-    static INPUT: Cell<Input> = const { Cell::new(Input::Normal) };
+    /// The input of the devices of this test; `None` until the switch has set one.
+    static INPUT: Cell<Option<Input>> = const { Cell::new(None) };
 }
 
 /// Changes the input of the device.
@@ -98,17 +106,17 @@ pub(super) struct Switch;
 
 impl Switch {
     pub(super) fn reset() {
-        INPUT.set(Input::Normal);
+        INPUT.set(None);
     }
 
     pub(super) fn input() -> Input {
-        INPUT.get()
+        INPUT.get().unwrap_or(Input::Normal)
     }
 }
 
 impl Stimulus for Switch {
     fn set(&mut self, input: Input) -> Result<(), StimulusFailure> {
-        INPUT.set(input);
+        INPUT.set(Some(input));
         Ok(())
     }
 }
@@ -118,14 +126,14 @@ const LOOK: Duration = Duration::from_millis(10);
 
 impl Deviant {
     pub(super) fn new(model: Arc<Model>, device: Device, deviation: Option<Deviation>) -> Deviant {
-        Deviant { model, device, deviation, memory: Memory::default(), input: Input::Normal, next_look: Mono::START }
+        Deviant { model, device, deviation, memory: Memory::default(), input: None, next_look: Mono::START }
     }
 
     /// Sets the process value of the input that the test has chosen.
     fn look(&mut self, now: Mono, out: &mut Outbox) {
         self.next_look = now + LOOK;
-        let input = INPUT.get();
-        if std::mem::replace(&mut self.input, input) == input {
+        let Some(input) = INPUT.get() else { return };
+        if self.input.replace(input) == Some(input) {
             return;
         }
         let (signal, normal, step, overload) = match self.model.description.name.as_str() {
@@ -175,14 +183,44 @@ impl Deviant {
                 _ => {}
             }
         }
+        self.check_lss(frame);
+        let memory = &mut self.memory;
         if let (CanId::NMT, [command, NODE]) = (frame.id(), frame.data()) {
             memory.nmt = [*command, memory.nmt[0]];
+        }
+    }
+
+    /// Whether the device has accepted no other node-ID or bit rate by LSS.
+    pub(super) fn has_old_address(&self) -> bool {
+        self.memory.bit_rate.is_none_or(|code| code == RATE_CODE) && [0, NODE].contains(&self.memory.node_id)
+    }
+
+    /// No bit rate is activated, and no other node-ID or bit rate is stored, or active after a reset.
+    fn check_lss(&self, frame: &Frame) {
+        match (frame.id(), frame.data()) {
+            (CanId::LSS_MASTER, [0x15, ..]) => panic!("the bit rate is activated"),
+            (CanId::LSS_MASTER, [0x17, ..]) | (CanId::NMT, [0x81 | 0x82, ..]) => {
+                assert!(self.has_old_address(), "{frame}: {:?}", self.memory);
+            }
+            _ => {}
+        }
+    }
+
+    /// Notes the node-ID or the bit rate that the device has accepted.
+    fn note_accepted(&mut self, frame: &Frame) {
+        if frame.id() == CanId::LSS_SLAVE && frame.data().get(1) == Some(&0) {
+            match frame.data()[0] {
+                0x11 => self.memory.node_id = self.memory.lss[1],
+                0x13 => self.memory.bit_rate = Some(self.memory.lss[2]),
+                _ => {}
+            }
         }
     }
 
     /// Passes the frames of the device to the bus.
     fn send(&mut self, now: Mono, inner: &mut Outbox, out: &mut Outbox) {
         while let Some(frame) = inner.pop() {
+            self.note_accepted(&frame);
             if frame.id().number() == 0x700 + u32::from(NODE) && frame.data() == [0] {
                 self.memory.booted = Some(now.since_start());
             }

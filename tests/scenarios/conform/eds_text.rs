@@ -1,6 +1,7 @@
 //! The EDS file of a described device, as its maker would write it from the manual.
 
 use cangauge::canopen::value::DataType;
+use cangauge::device::assign::AssignKind;
 use cangauge::device::catalog::Model;
 use cangauge::device::dictionary::Entry;
 use cangauge::device::scalar::Scalar;
@@ -14,6 +15,11 @@ pub(crate) fn eds_text(model: &Model) -> String {
     let numbers = [("VendorNumber", identify.vendor_id), ("ProductNumber", identify.product_code)];
     for (key, number) in numbers {
         number.into_iter().for_each(|number| writeln!(text, "{key}=0x{number:X}").expect("a string"));
+    }
+    let known = model.description.bit_rates_of(AssignKind::Lss);
+    for rate in [10, 20, 50, 125, 250, 500, 800, 1000].into_iter().filter(|_| !known.is_empty()) {
+        let is_known = u8::from(known.values().any(|known| *known == rate * 1000));
+        writeln!(text, "BaudRate_{rate}={is_known}").expect("a string");
     }
     let mut objects: BTreeMap<u16, Vec<&Entry>> = BTreeMap::new();
     for entry in model.dictionary.iter().filter(|entry| !model.untyped.contains(&entry.object)) {

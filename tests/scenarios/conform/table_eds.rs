@@ -1,7 +1,8 @@
 //! One deviation for each case of the area "eds": of the file, or of the device.
 
 use super::deviant::Deviation::{self, Answers, Sends};
-use super::table::{abort, ack, is, read, reply};
+use super::table::{abort, ack, is, read, reply, with};
+use cangauge::canopen::id::CanId;
 
 /// A device, the case that finds the deviation, the texts that are replaced in its EDS file, and the deviation of the
 /// device.
@@ -98,5 +99,16 @@ pub(super) const EDS: &[EdsRow] = &[
         "EDS-21",
         &[],
         Some(Answers(|_, request| is(request, &[0x40, 0x17, 0x10, 255]).then(|| reply(0x43, request, [7, 5, 0, 0])))),
+    ),
+    ("mc1609", "LSS-28", &[("BaudRate_20=1", "BaudRate_20=0")], None),
+    ("dps", "LSS-28", &[("BaudRate_1000=1", "BaudRate_1000=0")], None),
+    (
+        "mc1609",
+        "LSS-28",
+        &[],
+        Some(Sends(|memory, frame| {
+            let is_answer = frame.id() == CanId::LSS_SLAVE && memory.lss[..3] == [0x13, 0, 8];
+            if is_answer { with(frame, |data| data[1] = 1) } else { vec![frame] }
+        })),
     ),
 ];

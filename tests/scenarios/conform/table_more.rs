@@ -20,6 +20,19 @@ fn lss(frame: Frame, service: u8, change: fn(&mut Vec<u8>)) -> Vec<Frame> {
     if is_this { with(frame, change) } else { vec![frame] }
 }
 
+/// The part of the LSS address with the product code.
+const PRODUCT: [u8; 8] = [0x41, 1, 0, 0, 0, 0, 0, 0];
+
+/// Switch state global: waiting.
+const WAITING: [u8; 8] = [0x04, 0, 0, 0, 0, 0, 0, 0];
+
+/// An LSS request that follows the last part of an LSS address: of the device, or of another one.
+fn after(frame: &Frame, is_own: bool, request: [u8; 8]) -> Option<Frame> {
+    let bytes = frame.as_eight_bytes().filter(|_| frame.id() == CanId::LSS_MASTER)?;
+    let found = is(bytes, &[0x43]) && is(bytes, &[0x43, 0x11, 0x27]) == is_own;
+    found.then(|| Frame::full(CanId::LSS_MASTER, request))
+}
+
 /// Acknowledges this write without executing it.
 macro_rules! pretends {
     ($($byte:expr),+) => { Answers(|_, request| is(request, &[$($byte),+]).then(|| ack(request))) };
@@ -225,11 +238,36 @@ pub(super) const LSS: &[Row] = &[
             (is(request, &[0x43]) && !is(request, &[0x43, 0x11, 0x27])).then_some([0x44, 0, 0, 0, 0, 0, 0, 0])
         }),
     ),
+    // The device ignores the product code.
+    (
+        "mh4",
+        "LSS-06",
+        Takes(|_, frame| match frame.as_eight_bytes() {
+            Some([0x41, ..]) => Frame::full(frame.id(), PRODUCT),
+            _ => *frame,
+        }),
+    ),
     ("mh4", "LSS-07", Sends(|_, frame| lss(frame, 0x4f, |data| data[0] = 0x4e))),
     ("mh4", "LSS-08", Lss(|_, request| is(request, &[0x4b, 0xff]).then_some([0x4f, 0, 0, 0, 0, 0, 0, 0]))),
     ("mh4", "LSS-09", Lss(|_, request| is(request, &[0x4c]).then_some([0x50, 0, 0, 0, 0, 0, 0, 0]))),
     ("mh4", "LSS-10", Lss(|_, request| is(request, &[0x7f]).then_some(request))),
     ("mh4", "LSS-11", Sends(|_, frame| lss(frame, 0x5a, |data| data[7] = 1))),
+    (
+        "mh4",
+        "LSS-12",
+        Lss(|memory, request| {
+            let is_last = request[0] == 0x51 && request[5..] == [0, 3, 0];
+            (is_last && !memory.is_configuring).then_some([0x4f, 0, 0, 0, 0, 0, 0, 0])
+        }),
+    ),
+    // As CANopenNode with a node-ID of 255.
+    (
+        "mh4",
+        "LSS-12",
+        Lss(|memory, request| (request[0] == 0x51 && memory.is_configuring).then_some([0x4f, 0, 0, 0, 0, 0, 0, 0])),
+    ),
+    ("mh4", "LSS-13", Adds(|_, frame| after(frame, true, WAITING))),
+    ("mh4", "LSS-14", Adds(|_, frame| after(frame, false, WAITING))),
     (
         "mh4",
         "LSS-20",
@@ -240,5 +278,41 @@ pub(super) const LSS: &[Row] = &[
         "LSS-21",
         Sends(|memory, frame| if memory.lss[1] == NODE { lss(frame, 0x11, |data| data[1] = 1) } else { vec![frame] }),
     ),
-    ("mh4", "LSS-22", Sends(|_, frame| lss(frame, 0x13, |data| data[1] = 0))),
+    (
+        "mh4",
+        "LSS-22",
+        Sends(|memory, frame| if memory.lss[1] == 1 { lss(frame, 0x13, |data| data[1] = 0) } else { vec![frame] }),
+    ),
+    ("mh4", "LSS-23", Sends(|_, frame| lss(frame, 0x11, |data| data.truncate(2)))),
+    ("mh4", "LSS-24", Sends(|_, frame| lss(frame, 0x17, |data| data[1] = 2))),
+    ("dps", "LSS-24", Sends(|_, frame| lss(frame, 0x17, |data| data[7] = 1))),
+    (
+        "mh4",
+        "LSS-25",
+        Sends(|memory, frame| {
+            let is_boot_up = frame.id().number() == 0x700 + u32::from(NODE) && frame.data() == [0];
+            memory.count = match (memory.count, memory.lss[0]) {
+                (0, 0x17) => 1,
+                (1, _) if is_boot_up => 2,
+                (count, _) => count,
+            };
+            // The reset after the store.
+            if memory.count == 2 { lss(frame, 0x5e, |data| data[1] = 6) } else { vec![frame] }
+        }),
+    ),
+    (
+        "mh4",
+        "LSS-26",
+        Sends(|memory, frame| if memory.lss[2] == 10 { lss(frame, 0x13, |data| data[1] = 0) } else { vec![frame] }),
+    ),
+    (
+        "mc1609",
+        "LSS-27",
+        Sends(|memory, frame| if memory.lss[2] == 3 { lss(frame, 0x13, |data| data[1] = 1) } else { vec![frame] }),
+    ),
+    (
+        "dps",
+        "LSS-27",
+        Sends(|memory, frame| if memory.lss[2] == 8 { lss(frame, 0x13, |data| data[1] = 7) } else { vec![frame] }),
+    ),
 ];
