@@ -10,6 +10,7 @@ use crate::device::dictionary::Entry;
 use crate::device::quirk::Quirk;
 use crate::device::scalar::{NumberRange, Scalar};
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 /// The facts about one entry for the server.
@@ -145,8 +146,12 @@ impl Objects {
         self.specs.contains_key(&object)
     }
 
-    pub(super) fn has_index(&self, index: u16) -> bool {
-        self.specs.range(ObjectId::new(index, 0)..=ObjectId::new(index, 255)).next().is_some()
+    /// Returns the indexes of this range that have an entry, in ascending order.
+    pub(super) fn indexes(&self, range: RangeInclusive<u16>) -> Vec<u16> {
+        let entries = ObjectId::new(*range.start(), 0)..=ObjectId::new(*range.end(), 255);
+        let mut indexes: Vec<u16> = self.specs.range(entries).map(|(object, _)| object.index).collect();
+        indexes.dedup();
+        indexes
     }
 
     /// Returns the working value.
@@ -219,7 +224,7 @@ impl Objects {
     fn find(&self, object: ObjectId) -> Result<&Spec, Abort> {
         match self.spec(object) {
             Some(spec) => Ok(spec),
-            None if self.has_index(object.index) => Err(Abort::NO_SUB_INDEX),
+            None if !self.indexes(object.index..=object.index).is_empty() => Err(Abort::NO_SUB_INDEX),
             None => Err(Abort::NO_OBJECT),
         }
     }

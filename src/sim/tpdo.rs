@@ -66,8 +66,7 @@ pub(super) enum Cause {
 impl Tpdo {
     /// Returns all TPDOs in the object dictionary.
     pub(super) fn all(objects: &Objects, style: PdoStyle) -> Vec<Tpdo> {
-        let numbers = (0..512).filter(|number| objects.has_index(0x1800 + number));
-        numbers.map(|number| Tpdo::new(number, style)).collect()
+        objects.indexes(0x1800..=0x19ff).into_iter().map(|index| Tpdo::new(index - 0x1800, style)).collect()
     }
 
     fn new(number: u16, style: PdoStyle) -> Tpdo {
