@@ -202,6 +202,7 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::UnknownCode(object) => format!("the meaning of the number in {object} is unknown"),
         WhyNot::Rejected(object, code) => format!("{object}: the device rejected the write: {code}"),
         WhyNot::NotMoved(object) => format!("{object} did not change enough"),
+        WhyNot::NotReturned(object) => format!("{object} did not return to its value before the step"),
         WhyNot::StepTooSlow => "the step of the input takes longer than the filter".to_owned(),
         WhyNot::MovedEarly(object) => format!("{object} crossed the limit too early, by itself"),
         WhyNot::NearZero(object) => format!("{object} is too close to zero"),

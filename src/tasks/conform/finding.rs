@@ -268,6 +268,8 @@ pub enum WhyNot {
     Rejected(ObjectId, AbortCode),
     /// The process value has not moved far enough.
     NotMoved(ObjectId),
+    /// The process value is not the same as before the step when the input is normal again.
+    NotReturned(ObjectId),
     /// The step of the input takes longer than the response that it causes.
     StepTooSlow,
     /// The process value has crossed the limit by itself, before the case moved it.

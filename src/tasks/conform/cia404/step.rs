@@ -241,7 +241,7 @@ impl Subject {
         let until = session.master.now() + ARRIVAL;
         while session.quantity(value, data_type, self.digits)?.is_none_or(|reading| self.share(reading).abs() > 0.05) {
             if session.master.now() >= until {
-                return Ok(Err(Verdict::not_judged(WhyNot::NotMoved(value))));
+                return Ok(Err(Verdict::not_judged(WhyNot::NotReturned(value))));
             }
             session.pause(POLL)?;
         }
