@@ -150,7 +150,14 @@ pub(super) const ROWS: &[Row] = &[
         }),
     ),
     // The larger constant is the same as the smaller one.
-    ("mh4", "404-32", Takes(|_, frame| written_as(*frame, [0xa1, 0x61, 1], 500, 250))),
+    (
+        "mh4",
+        "404-32",
+        Takes(|_, frame| {
+            let halves = [16, 64, 250, 1000, 8000].into_iter();
+            halves.fold(*frame, |frame, half| written_as(frame, [0xa1, 0x61, 1], 2 * half, half))
+        }),
+    ),
     // The repeating average is a moving one.
     ("mh4", "404-33", Takes(|_, frame| written_as(*frame, [0xa0, 0x61, 1], 2, 1))),
     (
