@@ -257,7 +257,9 @@ def run_checks(binary, interface, checks, names=()):
         if names and check.__name__ not in names:
             continue
         started = time.monotonic()
-        with tempfile.TemporaryDirectory() as directory:
+        with tempfile.TemporaryDirectory() as directory, tempfile.TemporaryDirectory() as state:
+            # A journal of another run on this computer would make commands refuse.
+            os.environ["XDG_STATE_HOME"] = state
             try:
                 check(cangauge, directory, *arguments)
                 passed += 1
