@@ -117,10 +117,10 @@ impl Response {
         let (mut count, mut last) = (0, f64::NAN);
         for share in between {
             // A mean does not change until the next one.
-            if last.is_nan() || (share - last).abs() > 0.01 {
+            if last.is_nan() || (share - last).abs() > 0.02 {
                 count += 1;
+                last = share;
             }
-            last = share;
         }
         count
     }
@@ -255,13 +255,17 @@ impl Subject {
         }
         let ended = session.master.now();
         let mut response = Response { shares: Vec::new(), uncertainty: ended.since(started) + REACTION };
+        let (mut last, mut longest_gap) = (Duration::ZERO, Duration::ZERO);
         loop {
             let Some(reading) = session.quantity(value, data_type, self.digits)? else {
                 return Ok(Err(Verdict::not_judged(WhyNot::NoValidValue(value))));
             };
             let (time, reached) = (session.master.now().since(ended), self.share(reading));
             response.shares.push((time, reached));
+            longest_gap = longest_gap.max(time.saturating_sub(last));
+            last = time;
             if reached >= share || time > LIMIT {
+                response.uncertainty += longest_gap;
                 return Ok(Ok(response));
             }
             session.pause(POLL)?;
