@@ -48,7 +48,11 @@ impl SdoClient {
     /// Whether a time-out has not started yet, because the clock was not read after sending.
     fn awaits_clock(&mut self) -> bool {
         // Most calls must not search through all nodes.
-        self.awaits_clock = self.awaits_clock && self.active_transfers().any(|active| active.read_clock_at.is_some());
+        if self.awaits_clock && self.active_transfers().all(|active| active.read_clock_at.is_none()) {
+            // The answer has arrived: only later deadlines apply.
+            self.awaits_clock = false;
+            self.update_due();
+        }
         self.awaits_clock
     }
 
