@@ -40,6 +40,13 @@ impl Clocks {
         self.read = now;
     }
 
+    /// Records a batch that was read after a wait of unknown length, at `latest` at the latest. `last`: the time of the
+    /// last frame before. The socket was empty after that frame.
+    pub(super) fn batch_after_wait(&mut self, last: Mono, latest: Mono) {
+        self.empty_at = self.empty_at.max(last);
+        (self.read, self.emptied) = (latest, false);
+    }
+
     /// Returns the receive time of a frame of the current batch. `now` reads both clocks.
     pub(super) fn stamp(&mut self, kernel: Option<Duration>, now: &dyn Fn() -> Stamp) -> Stamp {
         let start = match self.compared {
@@ -229,6 +236,19 @@ mod tests {
         let mut clocks = Clocks::default();
         clocks.batch(mono(20), true);
         assert_eq!(clocks.stamp(Some(Duration::from_millis(OPENED + 7)), &now).mono, mono(7));
+    }
+
+    #[test]
+    fn frame_of_a_wait_is_not_older_than_the_frame_before() {
+        let (computer, mut clocks) = (Computer::new(), Clocks::default());
+        computer.pass(100);
+        clocks.batch(mono(100), false);
+        assert_eq!(computer.stamp(&mut clocks, OPENED + 90), mono(90));
+        computer.pass(20);
+        // The clock was set back by 50 ms.
+        computer.wall.set(OPENED + 70);
+        clocks.batch_after_wait(mono(90), mono(130));
+        assert_eq!(computer.stamp(&mut clocks, OPENED + 65), mono(115));
     }
 
     #[test]

@@ -191,9 +191,14 @@ impl SocketCan {
                 self.is_drained = count < receive::BATCH;
                 if wait {
                     // An upper estimate of the receive time. A later frame causes a new comparison of the clocks.
-                    self.clocks.batch(self.latest() + ANSWER_TIME + ANSWER_TIME, false);
+                    self.clocks.batch_after_wait(self.last_frame_at, self.latest() + ANSWER_TIME + ANSWER_TIME);
                 } else {
-                    self.clocks.batch(self.mono(), self.is_drained);
+                    let now = self.mono();
+                    self.clocks.batch(now, self.is_drained);
+                    // In dense traffic, the next frame also comes soon.
+                    if now.since(self.last_frame_at) < ANSWER_TIME {
+                        self.expected_answers = ANSWERS;
+                    }
                 }
                 Ok(true)
             }
