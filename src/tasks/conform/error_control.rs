@@ -172,7 +172,7 @@ fn prepare_guarding(session: &mut Session<'_, '_>) -> Result<Option<Verdict>, Er
     let Some(guard_time) = session.number(GUARD_TIME)? else {
         return Ok(Some(Verdict::NotApplicable(WhyNot::NoObject(GUARD_TIME))));
     };
-    // The first request starts life guarding, which fails after the check.
+    // The first guarding request would start life guarding, and the device would report an error after the check.
     if guard_time > 0 && session.number(LIFE_TIME_FACTOR)?.is_some_and(|factor| factor > 0) {
         return Ok(Some(Verdict::not_judged(WhyNot::LifeGuarding)));
     }
@@ -234,7 +234,7 @@ fn life_time(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     if session.number(LIFE_TIME_FACTOR)?.is_none() {
         return Ok(Verdict::NotApplicable(WhyNot::NoObject(LIFE_TIME_FACTOR)));
     }
-    // An earlier guarding request may have started life guarding. It then fails with the first life time.
+    // An earlier guarding request may have started life guarding, which then fails as soon as a life time is set.
     if !session.may_cause_error()? {
         return Ok(Verdict::not_judged(WhyNot::ErrorHistory));
     }

@@ -141,9 +141,9 @@ pub enum Expected {
     Step {
         /// The share in per cent.
         percent: u8,
-        /// The first time.
+        /// The earliest time.
         from: Duration,
-        /// The last time.
+        /// The latest time.
         until: Duration,
     },
     /// At most one value between the values before and after a step of the input.
@@ -239,13 +239,13 @@ pub enum WhyNot {
     NoLss,
     /// The device does not answer this LSS service.
     NoService(u8),
-    /// The device rejects this LSS service, as it may.
+    /// The device rejects this LSS service.
     LssRejected(u8),
     /// The bit rate of the bus or its code for LSS is unknown, so that the bit rate could not be set again.
     UnknownBitRate,
-    /// The device can detect the bit rate. Whether it does cannot be read, so that it could not be set again.
+    /// The device can detect the bit rate. Whether detection is active cannot be read, so it could not be set again.
     DetectsBitRate {
-        /// Whether the case has set the present bit rate. The device uses it until it is switched on again.
+        /// Whether the case has set the present bit rate. It then replaces the detection until the next power-on.
         was_set: bool,
     },
     /// The EDS file names no bit rates.
@@ -268,7 +268,7 @@ pub enum WhyNot {
     Rejected(ObjectId, AbortCode),
     /// The process value has not moved far enough.
     NotMoved(ObjectId),
-    /// The process value is not the same as before the step when the input is normal again.
+    /// With the normal input, the process value has not returned to its value before the step.
     NotReturned(ObjectId),
     /// The step of the input takes longer than the response that it causes.
     StepTooSlow,

@@ -16,9 +16,9 @@ pub struct ErrorEntries {
 /// An error history that is not as before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HistoryChange {
-    /// Before the first case.
+    /// The error history before the first case.
     pub before: ErrorEntries,
-    /// After the last case.
+    /// The error history after the last case.
     pub after: ErrorEntries,
 }
 
@@ -31,8 +31,8 @@ impl Session<'_, '_> {
         Ok(Some(ErrorEntries { count, newest }))
     }
 
-    /// Compares the error history with the one before the first case. Cases delete the entries that they cause, so that
-    /// a difference is an error that no case has expected, or a deletion by a reset.
+    /// Compares the error history with the history before the first case. Cases delete the entries that they cause. So a
+    /// difference is an error that no case has expected, or a reset has deleted entries.
     pub(super) fn history_change(&mut self) -> Result<Option<HistoryChange>, Error> {
         let Some(before) = self.settings.history else { return Ok(None) };
         let after = self.despite_interrupts(Self::error_entries)?;

@@ -44,7 +44,7 @@ pub(super) const CASES: &[Case] = &[
         "LSS-06",
         "Switch state selective with another vendor, product, revision or serial number is not answered",
         SWITCH,
-        address::others,
+        address::other_addresses,
     )
     .matters(High, "Another device gets the node-ID."),
     case(
@@ -85,7 +85,7 @@ pub(super) const CASES: &[Case] = &[
         "LSS-14",
         "In configuration state, the address of another device does not switch the device to waiting state",
         SWITCH,
-        address::stays,
+        address::stays_in_configuration,
     )
     .matters(Low, "Of several devices in configuration state, only one executes a service."),
     case("LSS-20", "Node-IDs 0 and 128 are rejected", CONFIGURE, configuration::wrong_node_ids)
@@ -108,7 +108,7 @@ pub(super) const CASES: &[Case] = &[
     case("LSS-24", "Store configuration is acknowledged", CONFIGURE, configuration::store)
         .matters(High, "The node-ID cannot be stored.")
         .stores(),
-    case("LSS-25", "After a store and a reset, the device has its node-ID", CONFIGURE, configuration::kept)
+    case("LSS-25", "After a store and a reset, the device has its node-ID", CONFIGURE, configuration::keeps_node_id)
         .matters(High, "The device has another node-ID after a restart and is lost.")
         .stores(),
     case(
@@ -132,7 +132,7 @@ pub(super) const CASES: &[Case] = &[
         .stores(),
 ];
 
-/// The wait for an answer. CiA 305 gives no time.
+/// How long to wait for an answer. CiA 305 states no time.
 const TIMEOUT: Duration = Duration::from_millis(100);
 
 const IDENTITY: ObjectId = ObjectId::new(0x1018, 0);
@@ -143,7 +143,7 @@ impl Session<'_, '_> {
         self.lss_within(request, TIMEOUT)
     }
 
-    /// The same with another time-out.
+    /// Sends an LSS request, and waits for the answer until this time-out.
     fn lss_within(&mut self, request: &[u8], timeout: Duration) -> Result<Option<Frame>, Error> {
         let mut data = [0; 8];
         data[..request.len()].copy_from_slice(request);
@@ -160,13 +160,13 @@ impl Session<'_, '_> {
         self.lss_within(&[0x04, mode], SETTLE).map(drop)
     }
 
-    /// Sends a service with a number.
+    /// Sends a service with a 32-bit number. Returns the answer.
     fn lss_number(&mut self, service: u8, number: u32) -> Result<Option<Frame>, Error> {
         let [a, b, c, d] = number.to_le_bytes();
         self.lss(&[service, a, b, c, d])
     }
 
-    /// The four numbers of 1018h.
+    /// Reads the LSS address: the four numbers of 1018h.
     fn address(&mut self) -> Result<Option<[u32; 4]>, Error> {
         let mut address = [0; 4];
         for (sub, part) in (1..).zip(&mut address) {
@@ -178,7 +178,7 @@ impl Session<'_, '_> {
         Ok(Some(address))
     }
 
-    /// Sends an address. Returns the answer to the serial number, or an earlier one.
+    /// Sends switch state selective. Returns the answer to the serial number, or to an earlier part of the address.
     fn select(&mut self, address: [u32; 4]) -> Result<Option<Frame>, Error> {
         for (service, number) in (0x40..).zip(address) {
             let answer = if service < 0x43 {
@@ -196,7 +196,7 @@ impl Session<'_, '_> {
         Ok(None)
     }
 
-    /// Sends a range. Returns the answer to the last part, or an earlier one.
+    /// Sends identify remote slave. Returns the answer to the last part of the range, or to an earlier part.
     fn identify(&mut self, parts: [u32; 6]) -> Result<Option<Frame>, Error> {
         for (service, number) in (0x46..).zip(parts) {
             let answer = self.lss_number(service, number)?;
@@ -208,7 +208,7 @@ impl Session<'_, '_> {
     }
 }
 
-/// Brings the node to a state in which it answers LSS, and to waiting state. `false` if it has no LSS.
+/// Brings the node to an NMT state in which it answers LSS, and to waiting state. Returns `false` if it has no LSS.
 fn prepare(session: &mut Session<'_, '_>) -> Result<bool, Error> {
     let Some(address) = session.address()? else { return Ok(false) };
     let known = session.lss_command;
@@ -239,7 +239,8 @@ fn expect_silence(answer: Option<Frame>) -> Verdict {
     Verdict::of(answer.map(|frame| Finding::new(Expected::NoAnswer, Seen::Frame(frame))))
 }
 
-fn configure(session: &mut Session<'_, '_>) -> Result<bool, Error> {
+/// Brings the node to configuration state. Returns `false` if it has no LSS.
+fn enter_configuration(session: &mut Session<'_, '_>) -> Result<bool, Error> {
     if !prepare(session)? {
         return Ok(false);
     }
@@ -247,7 +248,7 @@ fn configure(session: &mut Session<'_, '_>) -> Result<bool, Error> {
     Ok(true)
 }
 
-/// The finding if an answer with this number of used bytes does not have eight bytes, or the others are not 0.
+/// Returns a finding if an answer does not have eight bytes, or if a byte after the first `used` bytes is not 0.
 fn wrong_form(answer: Frame, used: usize) -> Option<Finding> {
     if answer.data().len() != 8 {
         return Some(Finding::new(Expected::EightBytes, Seen::Frame(answer)));
@@ -256,12 +257,12 @@ fn wrong_form(answer: Frame, used: usize) -> Option<Finding> {
     (!is_padded).then(|| Finding::new(Expected::ZeroPadding, Seen::Frame(answer)))
 }
 
-/// Whether an answer is the acknowledgement of this configuration service, without an error code.
+/// Whether an answer acknowledges this configuration service (error code 0).
 fn is_accepted(answer: &Frame, service: u8) -> bool {
     matches!(answer.data(), [found, 0, ..] if *found == service)
 }
 
-/// Whether an answer is a rejection by this configuration service, with any error code.
+/// Whether an answer rejects this configuration service (any other error code).
 fn is_rejected(answer: &Frame, service: u8) -> bool {
     matches!(answer.data(), [found, code, ..] if *found == service && *code != 0)
 }

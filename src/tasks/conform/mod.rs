@@ -74,7 +74,7 @@ pub struct ConformOptions {
     pub only: Vec<Area>,
     /// The numbers of cases that are not run.
     pub skip: Vec<String>,
-    /// Also run the cases that store settings, set the node-ID, or write a signature.
+    /// Also run the cases that write to non-volatile memory, set the node-ID or the bit rate, or execute autozero.
     pub store: bool,
     /// The EDS file that is compared with the device.
     pub eds: Option<Arc<Eds>>,
@@ -266,7 +266,7 @@ impl Session<'_, '_> {
             } else if case.needs.needs_store() && !options.store {
                 Ok(Verdict::NotApplicable(WhyNot::NeedsStore))
             } else if let Some(setting) = self.lss_pending.failed.first() {
-                // A reset would activate it.
+                // A reset would activate the new value.
                 Ok(Verdict::not_judged(WhyNot::LssNotRestored(*setting)))
             } else {
                 (case.run)(self)

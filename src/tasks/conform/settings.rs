@@ -179,7 +179,7 @@ impl Session<'_, '_> {
         self.despite_interrupts(Self::restore_once)
     }
 
-    /// Repeats an action that Ctrl-C has ended.
+    /// Runs an action, and repeats it if Ctrl-C interrupts it.
     pub(super) fn despite_interrupts<T>(&mut self, act: impl Fn(&mut Self) -> Result<T, Error>) -> Result<T, Error> {
         let mut result = act(self);
         for _ in 0..MAX_INTERRUPTS {
@@ -206,7 +206,7 @@ impl Session<'_, '_> {
         self.wake_up()?;
         self.end_transfer()?;
         if std::mem::take(&mut self.guarded) {
-            // Life guarding is off before the last request. It cannot fail again.
+            // Life guarding is switched off before the last guarding request, so that it cannot fail again.
             self.put_back(GUARD_TIME)?;
             self.put_back(LIFE_TIME_FACTOR)?;
             self.end_guarding_error()?;

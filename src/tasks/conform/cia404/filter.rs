@@ -1,4 +1,4 @@
-//! The filter (61A0h, 61A1h) without a change of the input: rejected types, and the mean. `step` checks its response.
+//! The filter (61A0h, 61A1h) without a change of the input: rejected types, and the mean. The step response is in `step`.
 
 use super::super::case::{Area, Case, Run, Severity::*};
 use super::super::codes;

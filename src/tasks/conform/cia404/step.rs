@@ -1,7 +1,8 @@
-//! The step response of the filter (61A0h, 61A1h) and the sample rate (6114h). The user produces the step (`--stimulus`).
+//! The step response of the filter (61A0h, 61A1h), and the sample rate (6114h). The command of `--stimulus` makes the
+//! step.
 //!
-//! The time between two samples is often unknown. The cases therefore compare times: twice the filter constant or twice
-//! the sample time is twice the time to the middle of the step.
+//! The time between two samples is often unknown, so the cases compare two responses. With twice the filter constant or
+//! twice the sample time, the value takes twice the time to the middle of the step.
 
 use super::super::case::{Area, Case, Run, Severity::*};
 use super::super::codes;
@@ -56,29 +57,29 @@ pub(in super::super) const CASES: &[Case] = &[
 const FILTER: &str = "CiA 404, objects 61A0h and 61A1h";
 const SAMPLE_TIME: u16 = 0x6114;
 
-/// The filter constants that are tried until the response is much slower than the input. The last one is for sample times
-/// of 0.05 ms.
+/// The filter constants that are tried until the response is much slower than the input. The last constant is for sample
+/// times of 0.05 ms.
 const CONSTANTS: [u16; 5] = [16, 64, 250, 1000, 8000];
 
 /// The time between two readings.
 const POLL: Duration = Duration::from_millis(5);
 
-/// A device shows a step of its input within this time, besides the filter.
+/// Without a filter, the device shows a step of its input within this time.
 const REACTION: Duration = Duration::from_millis(20);
 
-/// A response is slow enough to be judged if it takes this many times the uncertainty.
-const CLEAR: u32 = 5;
+/// A response is slow enough for a verdict if it takes this many times the uncertainty.
+const SLOW_FACTOR: u32 = 5;
 
-/// The longest time of a response.
-const LIMIT: Duration = Duration::from_secs(20);
+/// The recording of a response ends after this time.
+const RESPONSE_LIMIT: Duration = Duration::from_secs(20);
 
 /// How long the input may take to reach its new value after the command has ended.
 const ARRIVAL: Duration = Duration::from_millis(500);
 
-/// The time of the step is not known well enough if the command takes longer than this.
+/// If the command takes longer than this, the time of the step is not known well enough.
 const LONGEST_COMMAND: Duration = Duration::from_secs(1);
 
-/// A step is this many times larger than the noise.
+/// A step has to be this many times larger than the noise.
 const NOISE_FACTOR: f64 = 20.0;
 
 /// The channel whose input is changed, and the step without a filter.
@@ -90,16 +91,16 @@ struct Subject {
     /// The value before and after the step.
     from: f64,
     to: f64,
-    /// The noise of both, as a share of the step.
+    /// The noise of both values, as a share of the step.
     noise: f64,
-    /// The time to the middle of the step.
-    own: Duration,
+    /// The time to the middle of the step without a filter.
+    base_time: Duration,
 }
 
-/// What the device showed after a step: the share of the step at each time after the end of the command.
+/// The response to a step: for each reading, the time since the end of the command, and the share of the step.
 struct Response {
     shares: Vec<(Duration, f64)>,
-    /// How exactly the time of the step is known.
+    /// The largest error of the times.
     uncertainty: Duration,
 }
 
@@ -109,14 +110,14 @@ impl Response {
         self.shares.iter().find(|(_, reached)| *reached >= share).map(|(time, _)| *time)
     }
 
-    /// The number of different values between the old and the new one.
+    /// Counts the different values between the old and the new value.
     fn values_between(&self, noise: f64) -> usize {
         let margin = 0.05 + noise;
         let between =
             self.shares.iter().map(|(_, share)| *share).filter(|share| (margin..1.0 - margin).contains(share));
         let (mut count, mut last) = (0, f64::NAN);
         for share in between {
-            // A mean does not change until the next one.
+            // Each mean is shown until the next mean is complete.
             if last.is_nan() || (share - last).abs() > 0.02 {
                 count += 1;
                 last = share;
@@ -126,9 +127,10 @@ impl Response {
     }
 }
 
-type Found<T> = Result<Result<T, Verdict>, Error>;
+/// A result, or the verdict if the case cannot continue.
+type OrVerdict<T> = Result<Result<T, Verdict>, Error>;
 
-/// Returns the verdict from a function if a step is not possible.
+/// Returns the result, or ends the case with the verdict.
 macro_rules! or_verdict {
     ($found:expr) => {
         match $found? {
@@ -138,8 +140,8 @@ macro_rules! or_verdict {
     };
 }
 
-/// The first channel with a filter whose type and constant can be set.
-fn filtered(session: &mut Session<'_, '_>) -> Found<(Channel, usize)> {
+/// Returns the first channel with a filter type and a filter constant, and the width of the constant in bytes.
+fn filtered(session: &mut Session<'_, '_>) -> OrVerdict<(Channel, usize)> {
     for channel in channels(session)? {
         let [kind, constant] = [TYPE, CONSTANT].map(|index| channel.object(index));
         if !session.node.may_have(kind) || !session.node.may_have(constant) {
@@ -151,8 +153,14 @@ fn filtered(session: &mut Session<'_, '_>) -> Found<(Channel, usize)> {
     Ok(Err(Verdict::NotApplicable(WhyNot::NoSuitableObject)))
 }
 
-/// Sets the filter. The verdict if the device rejects it.
-fn set_filter(session: &mut Session<'_, '_>, channel: &Channel, kind: u8, constant: u16, width: usize) -> Found<()> {
+/// Sets the filter. Returns the verdict if the device rejects the type or the constant.
+fn set_filter(
+    session: &mut Session<'_, '_>,
+    channel: &Channel,
+    kind: u8,
+    constant: u16,
+    width: usize,
+) -> OrVerdict<()> {
     let mut bytes = u64::from(constant).to_le_bytes().to_vec();
     bytes.truncate(width.clamp(1, 4));
     for (index, bytes) in [(CONSTANT, bytes), (TYPE, vec![kind])] {
@@ -164,8 +172,8 @@ fn set_filter(session: &mut Session<'_, '_>, channel: &Channel, kind: u8, consta
     Ok(Ok(()))
 }
 
-/// Sets the normal input, without a filter.
-fn settle(session: &mut Session<'_, '_>, channel: &Channel, width: usize) -> Found<()> {
+/// Switches off the filter, and sets the normal input.
+fn settle(session: &mut Session<'_, '_>, channel: &Channel, width: usize) -> OrVerdict<()> {
     if let Err(verdict) = set_filter(session, channel, 1, 1, width)? {
         return Ok(Err(verdict));
     }
@@ -175,8 +183,8 @@ fn settle(session: &mut Session<'_, '_>, channel: &Channel, width: usize) -> Fou
     Ok(Ok(()))
 }
 
-/// Finds a channel, and measures the step without a filter: a moving average with the constant 1.
-fn subject(session: &mut Session<'_, '_>) -> Found<Subject> {
+/// Finds a channel, and measures the step without a filter (a moving average with the constant 1).
+fn subject(session: &mut Session<'_, '_>) -> OrVerdict<Subject> {
     let (channel, width) = match filtered(session)? {
         Ok(found) => found,
         Err(verdict) => return Ok(Err(verdict)),
@@ -214,8 +222,8 @@ fn subject(session: &mut Session<'_, '_>) -> Found<Subject> {
         return Ok(Err(Verdict::not_judged(WhyNot::NotMoved(value))));
     }
     let middle = readings.into_iter().find(|(_, reading)| (reading - from).abs() >= height / 2.0);
-    let own = middle.map_or(ARRIVAL, |(time, _)| time);
-    Ok(Ok(Subject { channel, digits, width, from, to, noise: noise / height, own }))
+    let base_time = middle.map_or(ARRIVAL, |(time, _)| time);
+    Ok(Ok(Subject { channel, digits, width, from, to, noise: noise / height, base_time }))
 }
 
 impl Subject {
@@ -224,8 +232,8 @@ impl Subject {
         (value - self.from) / (self.to - self.from)
     }
 
-    /// Sets the filter, waits until it is ready, produces the step, and records the values until the device shows a share
-    /// of it.
+    /// Sets the filter, waits for `ready_after`, makes the step, and records the values until the device shows this share
+    /// of the step.
     fn respond(
         &self,
         session: &mut Session<'_, '_>,
@@ -233,7 +241,7 @@ impl Subject {
         constant: u16,
         share: f64,
         ready_after: Duration,
-    ) -> Found<Response> {
+    ) -> OrVerdict<Response> {
         let (value, data_type) = self.channel.values[0];
         if let Err(verdict) = settle(session, &self.channel, self.width)? {
             return Ok(Err(verdict));
@@ -264,7 +272,7 @@ impl Subject {
             response.shares.push((time, reached));
             longest_gap = longest_gap.max(time.saturating_sub(last));
             last = time;
-            if reached >= share || time > LIMIT {
+            if reached >= share || time > RESPONSE_LIMIT {
                 response.uncertainty += longest_gap;
                 return Ok(Ok(response));
             }
@@ -272,9 +280,9 @@ impl Subject {
         }
     }
 
-    /// The response of a moving average that is slow enough to be judged, with its constant and the time to the middle
-    /// of the step. The verdict if there is none.
-    fn slow(&self, session: &mut Session<'_, '_>) -> Found<(u16, Response, Duration)> {
+    /// Finds a moving average whose response is slow enough for a verdict. Returns the filter constant, the response, and
+    /// the time to the middle of the step.
+    fn slow_response(&self, session: &mut Session<'_, '_>) -> OrVerdict<(u16, Response, Duration)> {
         let object = self.channel.object(CONSTANT);
         let mut last = None;
         let possible = CONSTANTS.into_iter().filter(|constant| self.width > 1 || *constant <= u16::from(u8::MAX) / 2);
@@ -284,26 +292,30 @@ impl Subject {
                 Err(verdict) => return Ok(Err(verdict)),
             };
             let Some(half) = response.time(0.5) else { break };
-            let half = half.saturating_sub(self.own);
-            if half >= response.uncertainty * CLEAR {
+            let half = half.saturating_sub(self.base_time);
+            // The next response takes up to 4.4 times this time, and has to end before the limit.
+            if half > RESPONSE_LIMIT / 5 {
+                break;
+            }
+            if half >= response.uncertainty * SLOW_FACTOR {
                 return Ok(Ok((constant, response, half)));
             }
             last = Some((constant, half, response.uncertainty));
         }
-        // The largest constant has no effect.
+        // Even the largest constant has no effect.
         if let Some((constant, half, uncertainty)) = last
             && constant == CONSTANTS[CONSTANTS.len() - 1]
             && half <= uncertainty
         {
-            let expected = Expected::Step { percent: 50, from: uncertainty, until: LIMIT };
+            let expected = Expected::Step { percent: 50, from: uncertainty, until: RESPONSE_LIMIT };
             return Ok(Err(Verdict::of([Finding::at(object, expected, Seen::StepAfter(Some(half)))])));
         }
         Ok(Err(Verdict::not_judged(WhyNot::StepTooSlow)))
     }
 
-    /// The finding if a share of the step is not reached within these times.
+    /// Returns a finding if this share of the step is not reached within these times.
     fn expect(&self, response: &Response, object: ObjectId, percent: u8, times: Range<Duration>) -> Option<Finding> {
-        let seen = response.time(f64::from(percent) / 100.0).map(|time| time.saturating_sub(self.own));
+        let seen = response.time(f64::from(percent) / 100.0).map(|time| time.saturating_sub(self.base_time));
         let from = times.start.saturating_sub(response.uncertainty);
         let until = times.end + response.uncertainty;
         let is_right = seen.is_some_and(|seen| (from..=until).contains(&seen));
@@ -311,7 +323,7 @@ impl Subject {
         (!is_right).then(|| Finding::at(object, expected, Seen::StepAfter(seen)))
     }
 
-    /// The finding if the middle of the step is not reached after twice this time.
+    /// Returns a finding if the middle of the step is not reached after about twice this time.
     fn expect_twice(&self, response: &Response, object: ObjectId, half: Duration) -> Option<Finding> {
         self.expect(response, object, 50, half.mul_f64(1.7)..half.mul_f64(2.3))
     }
@@ -319,10 +331,10 @@ impl Subject {
 
 fn moving(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let subject = or_verdict!(subject(session));
-    let (constant, response, half) = or_verdict!(subject.slow(session));
+    let (constant, response, half) = or_verdict!(subject.slow_response(session));
     let object = subject.channel.object(CONSTANT);
-    // CiA 404 adds a part of the difference to the value: 25 % after 0.42 times, 75 % after 2 times. The mean of the last
-    // N samples, which is also called a moving average, shows 25 % after 0.5 times, and 75 % after 1.5 times.
+    // Relative to the time of 50 %, the moving average of CiA 404 (a part of the difference is added to the value) shows
+    // 25 % after 0.42, and 75 % after 2. The mean of the last N samples shows 25 % after 0.5, and 75 % after 1.5.
     let shape = [(25, 0.35, 0.6), (75, 1.3, 2.3)];
     let mut findings: Vec<Finding> = shape
         .into_iter()
@@ -337,12 +349,12 @@ fn moving(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 
 fn repeating(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let subject = or_verdict!(subject(session));
-    let (constant, _, half) = or_verdict!(subject.slow(session));
+    let (constant, _, half) = or_verdict!(subject.slow_response(session));
     let object = subject.channel.object(TYPE);
     // Until the first mean is complete, the value is not defined.
     let first_mean = half.mul_f64(2.5);
     let response = or_verdict!(subject.respond(session, 2, constant, 0.95, first_mean));
-    // The first mean contains samples from before and after the step. The second one is the new value. The moving
+    // The first mean contains samples from before and after the step. The second mean is the new value. The moving
     // average reaches the middle after 0.5 to 0.7 times the time of one mean.
     let times = half.mul_f64(1.3)..half.mul_f64(4.4);
     let late = subject.expect(&response, object, 95, times);
@@ -351,8 +363,8 @@ fn repeating(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     Ok(Verdict::of(late.into_iter().chain(several)))
 }
 
-/// A sample time that can be written, as read and doubled. The verdict if there is none.
-fn sample_time(session: &mut Session<'_, '_>, channel: &Channel) -> Found<(ObjectId, Vec<u8>)> {
+/// Returns the object with the sample time, and twice its present value. Returns the verdict if it cannot be written.
+fn sample_time(session: &mut Session<'_, '_>, channel: &Channel) -> OrVerdict<(ObjectId, Vec<u8>)> {
     let object = channel.object(SAMPLE_TIME);
     let present = if session.node.may_have(object) { session.read(object)? } else { None };
     let Some(present) = present.filter(|bytes| (1..=8).contains(&bytes.len())) else {
@@ -397,7 +409,7 @@ fn sampled(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let (channel, _) = or_verdict!(filtered(session));
     let (object, twice) = or_verdict!(sample_time(session, &channel));
     let subject = or_verdict!(subject(session));
-    let (constant, _, half) = or_verdict!(subject.slow(session));
+    let (constant, _, half) = or_verdict!(subject.slow_response(session));
     if session.try_write(object, &twice)?.is_some() {
         return Ok(Verdict::NotApplicable(WhyNot::NotWritable(object)));
     }

@@ -1,4 +1,4 @@
-//! Sub-index 255 of objects: the object code and the data type.
+//! Compares sub-index 255 of objects (the object code and the data type) with the EDS file.
 
 use super::super::finding::{Expected, Finding, Seen, Verdict};
 use super::super::session::Session;
@@ -34,7 +34,7 @@ pub(super) fn types(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     Ok(Verdict::of(findings))
 }
 
-/// The finding if the object code or the data type differs from the file.
+/// Returns a finding if the object code or the data type differs from the file.
 fn wrong_part(object: ObjectId, subs: &[(u8, DataType)], found: &[u8]) -> Option<Finding> {
     let (code, type_code) = (u64::from(found[0]), u16::from(found[1]));
     let is_variable = matches!(subs, [(0, _)]);
@@ -42,7 +42,7 @@ fn wrong_part(object: ObjectId, subs: &[(u8, DataType)], found: &[u8]) -> Option
     if !(low..=high).contains(&code) {
         return Some(Finding::at(object, Expected::Range(low, high), Seen::Number(code)));
     }
-    // The types of records have no basic code.
+    // A record has a complex data type, which the file does not contain.
     let (_, expected) = *subs.iter().find(|(sub, _)| is_variable || code == ARRAY && (1..STRUCTURE).contains(sub))?;
     let shown = DataType::from_code(type_code);
     let seen = || shown.map_or(Seen::Number(type_code.into()), Seen::Type);

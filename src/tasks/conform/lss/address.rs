@@ -2,7 +2,7 @@
 
 use super::super::finding::{Expected, Finding, Seen, Verdict, WhyNot};
 use super::super::session::Session;
-use super::{NO_LSS, TIMEOUT, configure, expect_silence, prepare};
+use super::{NO_LSS, TIMEOUT, enter_configuration, expect_silence, prepare};
 use crate::canopen::frame::Frame;
 use crate::node::Error;
 
@@ -17,7 +17,7 @@ pub(super) fn selective(session: &mut Session<'_, '_>) -> Result<Verdict, Error>
     Ok(Verdict::of((!is_right).then(finding)))
 }
 
-pub(super) fn others(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+pub(super) fn other_addresses(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let Some(own) = session.address()? else { return Ok(NO_LSS) };
     if !prepare(session)? {
         return Ok(NO_LSS);
@@ -67,7 +67,7 @@ pub(super) fn configured(session: &mut Session<'_, '_>) -> Result<Verdict, Error
     Ok(Verdict::Pass)
 }
 
-/// A fastscan request. It asks for the bits of a part of the address from bit 31 down to bit `last`.
+/// Returns a fastscan request. It asks whether bits 31 to `last` of a part of the address are those of `number`.
 fn scan_request(number: u32, last: u8, part: u8, next: u8) -> [u8; 8] {
     let [a, b, c, d] = number.to_le_bytes();
     [0x51, a, b, c, d, last, part, next]
@@ -100,7 +100,7 @@ pub(super) fn scanned(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     Ok(expect_silence(answer))
 }
 
-/// The verdict of an inquiry that a device in configuration state answers.
+/// The verdict on the answer to inquiry 5Ah. A device in configuration state has to answer.
 fn expect_inquiry(answer: Option<Frame>) -> Verdict {
     match answer {
         Some(frame) if frame.data().first() == Some(&0x5a) => Verdict::Pass,
@@ -110,7 +110,7 @@ fn expect_inquiry(answer: Option<Frame>) -> Verdict {
 
 pub(super) fn configuring(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let Some(address) = session.address()? else { return Ok(NO_LSS) };
-    if !configure(session)? {
+    if !enter_configuration(session)? {
         return Ok(NO_LSS);
     }
     if session.lss(&[0x5a])?.is_none() {
@@ -124,9 +124,9 @@ pub(super) fn configuring(session: &mut Session<'_, '_>) -> Result<Verdict, Erro
     Ok(expect_inquiry(answer))
 }
 
-pub(super) fn stays(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+pub(super) fn stays_in_configuration(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let Some([vendor, product, revision, serial]) = session.address()? else { return Ok(NO_LSS) };
-    if !configure(session)? {
+    if !enter_configuration(session)? {
         return Ok(NO_LSS);
     }
     if session.lss(&[0x5a])?.is_none() {

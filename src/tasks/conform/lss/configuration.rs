@@ -3,7 +3,7 @@
 use super::super::finding::{Expected, Finding, Seen, Verdict, WhyNot};
 use super::super::session::Session;
 use super::pending::LssSetting::NodeId;
-use super::{NO_LSS, configure, is_accepted, is_rejected, prepare, wrong_form};
+use super::{NO_LSS, enter_configuration, is_accepted, is_rejected, prepare, wrong_form};
 use crate::bus::Received;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
@@ -14,7 +14,7 @@ use crate::node::Error;
 use crate::node::state::BOOT_TIMEOUT;
 
 pub(super) fn wrong_node_ids(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
-    if !configure(session)? {
+    if !enter_configuration(session)? {
         return Ok(NO_LSS);
     }
     for id in [0, 128] {
@@ -34,7 +34,7 @@ fn configure_own(session: &mut Session<'_, '_>) -> Result<Option<Frame>, Error> 
 }
 
 pub(super) fn own_node_id(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
-    if !configure(session)? {
+    if !enter_configuration(session)? {
         return Ok(NO_LSS);
     }
     Ok(match configure_own(session)? {
@@ -45,20 +45,20 @@ pub(super) fn own_node_id(session: &mut Session<'_, '_>) -> Result<Verdict, Erro
 }
 
 pub(super) fn form(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
-    if !configure(session)? {
+    if !enter_configuration(session)? {
         return Ok(NO_LSS);
     }
     let Some(answer) = configure_own(session)? else { return Ok(Verdict::NotApplicable(WhyNot::NoService(0x11))) };
     Ok(Verdict::of(wrong_form(answer, 3)))
 }
 
-/// Stores node-ID and bit rate. The verdict if the device does not acknowledge it.
+/// Sets the present node-ID, and stores node-ID and bit rate (17h). Returns the verdict if the device does not
+/// acknowledge one of the two services.
 ///
-/// The present node-ID is set before. The bit rate is not set: a device that detects the bit rate would then store a
-/// fixed one.
+/// The bit rate is not set: a device that detects the bit rate would then store a fixed bit rate.
 fn store_present(session: &mut Session<'_, '_>) -> Result<Result<Frame, Box<Verdict>>, Error> {
     let not_applicable = |why| Ok(Err(Box::new(Verdict::NotApplicable(why))));
-    if !configure(session)? {
+    if !enter_configuration(session)? {
         return Ok(Err(Box::new(NO_LSS)));
     }
     match configure_own(session)? {
@@ -82,13 +82,13 @@ pub(super) fn store(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     })
 }
 
-pub(super) fn kept(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+pub(super) fn keeps_node_id(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     if let Err(verdict) = store_present(session)? {
-        // LSS-24 judges the answer.
+        // LSS-24 reports the wrong answer.
         let is_wrong = matches!(*verdict, Verdict::Deviates(_));
         return Ok(if is_wrong { Verdict::NotApplicable(WhyNot::LssRejected(0x17)) } else { *verdict });
     }
-    // LSS-03 checks whether it is the present node-ID.
+    // LSS-03 checks whether the answer is the present node-ID.
     let before = session.lss(&[0x5e])?;
     let own = CanId::heartbeat(session.node.id);
     if let Some(boot_up) = reset(session)?

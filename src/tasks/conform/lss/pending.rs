@@ -8,7 +8,7 @@ use crate::device::assign::{AssignKind, RateTable};
 use crate::node::Error;
 use std::collections::BTreeMap;
 
-/// A setting of LSS.
+/// A setting that LSS can change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LssSetting {
     /// The node-ID (11h).
@@ -30,16 +30,17 @@ impl LssSetting {
 /// The settings that a case has sent.
 #[derive(Clone, Debug, Default)]
 pub(in super::super) struct PendingSettings {
-    /// The settings that may not be the old ones, and whether the device has accepted them.
+    /// The settings that may have a new value, and whether the device has acknowledged a new value.
     sent: BTreeMap<LssSetting, bool>,
     /// The settings that could not be set again.
     pub(in super::super) failed: Vec<LssSetting>,
 }
 
 impl Session<'_, '_> {
-    /// Sends a node-ID (11h) or a bit rate (13h). The old one is set again after the case, unless the device rejects it.
+    /// Sends a node-ID (11h) or a bit rate (13h). After the case, the old value is set again, unless the device has
+    /// rejected the new value.
     pub(super) fn configure(&mut self, setting: LssSetting, request: &[u8]) -> Result<Option<Frame>, Error> {
-        // The answer may get lost, or Ctrl-C comes before it.
+        // Noted before the answer: it may get lost, or Ctrl-C may end the wait.
         let before = self.lss_pending.sent.get(&setting).copied();
         self.lss_pending.sent.insert(setting, before == Some(true));
         let answer = self.lss(request)?;

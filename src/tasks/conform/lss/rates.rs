@@ -3,35 +3,35 @@
 use super::super::finding::{Expected, Finding, Seen, Verdict, WhyNot};
 use super::super::session::Session;
 use super::pending::LssSetting::BitRate;
-use super::{NO_LSS, TIMEOUT, configure, is_accepted, is_rejected};
+use super::{NO_LSS, TIMEOUT, enter_configuration, is_accepted, is_rejected};
 use crate::canopen::frame::Frame;
 use crate::node::Error;
 
-/// The codes that no device may accept. 255 is the highest of 10 to 255.
+/// Reserved codes, which no device may accept. 10 and 255 stand for all codes from 10 to 255.
 const RESERVED: [u8; 3] = [5, 10, 255];
 
 /// The codes of table 0 with a bit rate.
 const CODES: [u8; 8] = [0, 1, 2, 3, 4, 6, 7, 8];
 
-/// Automatic detection of the bit rate.
+/// The code for automatic detection of the bit rate.
 const DETECTION: u8 = 9;
 
 /// The bit rates that an EDS file can name, in bit/s.
 const OF_FILE: [u32; 8] = [10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
 
 impl Session<'_, '_> {
-    /// Sets a code of table 0.
+    /// Sends the bit rate with this code of table 0. Returns the answer.
     fn configure_rate(&mut self, code: u8) -> Result<Option<Frame>, Error> {
         self.configure(BitRate, &[0x13, 0, code])
     }
 }
 
-/// Switches the device to configuration state, if the present bit rate can be set again. The verdict if not.
+/// Brings the device to configuration state. Returns the verdict if the present bit rate could not be set again.
 fn prepare_rates(session: &mut Session<'_, '_>) -> Result<Option<Verdict>, Error> {
     if session.present_rate_code().is_none() {
         return Ok(Some(Verdict::not_judged(WhyNot::UnknownBitRate)));
     }
-    Ok((!configure(session)?).then_some(NO_LSS))
+    Ok((!enter_configuration(session)?).then_some(NO_LSS))
 }
 
 pub(super) fn reserved_table(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
@@ -54,19 +54,19 @@ pub(super) fn reserved_codes(session: &mut Session<'_, '_>) -> Result<Verdict, E
     for code in RESERVED {
         match session.configure_rate(code)? {
             Some(frame) if is_rejected(&frame, 0x13) => {}
-            Some(frame) => findings.push(wrong(code, false, frame)),
+            Some(frame) => findings.push(wrong_answer(code, false, frame)),
             None => return Ok(Verdict::NotApplicable(WhyNot::NoService(0x13))),
         }
     }
     Ok(Verdict::of(findings))
 }
 
-fn wrong(code: u8, is_accepted: bool, answer: Frame) -> Finding {
+fn wrong_answer(code: u8, is_accepted: bool, answer: Frame) -> Finding {
     Finding::new(Expected::RateCode { code, is_accepted }, Seen::Frame(answer))
 }
 
-/// The same as [`prepare_rates`], for cases that set codes that the device accepts. Afterwards the device has the
-/// present bit rate, and no automatic detection.
+/// Like [`prepare_rates`], for cases that send codes that the device may accept. After the case, the present bit rate is
+/// set, which ends automatic detection. So a device that can detect the bit rate gets a verdict here.
 fn prepare_accepted(session: &mut Session<'_, '_>) -> Result<Option<Verdict>, Error> {
     if session.rate_table().auto().is_some() {
         return Ok(Some(Verdict::NotApplicable(WhyNot::DetectsBitRate { was_set: false })));
@@ -86,10 +86,10 @@ pub(super) fn all_codes(session: &mut Session<'_, '_>) -> Result<Verdict, Error>
     if let Some(verdict) = prepare_accepted(session)? {
         return Ok(verdict);
     }
-    // If the device rejects the present bit rate, it could not be set again.
+    // If the device rejects the present bit rate, no other one is sent: the present one could not be set again.
     match session.configure_rate(own)? {
         Some(frame) if is_accepted(&frame, 0x13) => {}
-        Some(frame) => return Ok(Verdict::of([wrong(own, true, frame)])),
+        Some(frame) => return Ok(Verdict::of([wrong_answer(own, true, frame)])),
         None => return Ok(Verdict::of([Finding::new(Expected::Service(0x13), Seen::Nothing(TIMEOUT))])),
     }
     let mut findings = Vec::new();
@@ -121,7 +121,7 @@ pub(super) fn of_file(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
         let is_in_file = eds.info.bit_rates.contains(&rate);
         let Some(answer) = session.configure_rate(code)? else { continue };
         if is_accepted(&answer, 0x13) != is_in_file {
-            findings.push(wrong(code, is_in_file, answer));
+            findings.push(wrong_answer(code, is_in_file, answer));
         }
     }
     Ok(Verdict::of(findings))

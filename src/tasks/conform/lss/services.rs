@@ -2,7 +2,7 @@
 
 use super::super::finding::{Expected, Finding, Seen, Verdict, WhyNot};
 use super::super::session::Session;
-use super::{IDENTITY, NO_LSS, configure, expect_silence, prepare, wrong_form};
+use super::{IDENTITY, NO_LSS, enter_configuration, expect_silence, prepare, wrong_form};
 use crate::node::Error;
 
 pub(super) fn global(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
@@ -66,7 +66,7 @@ pub(super) fn unknown(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 }
 
 pub(super) fn form(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
-    if !configure(session)? {
+    if !enter_configuration(session)? {
         return Ok(NO_LSS);
     }
     let mut is_any = false;
