@@ -10,7 +10,7 @@ use std::{env, fs, io};
 /// Pairs of a folder with one TOML file per entry, and the generated file that lists their names and texts.
 const LISTS: [(&str, &str); 2] = [("src/device/devices", "devices.rs"), ("src/sim/models", "models.rs")];
 
-/// A linker script: the functions that `sdo read` uses, in the order of their first use. Made by `.ci/static --order`.
+/// A linker script with the functions of `sdo read` in the order of their first use. `.ci/static --order` writes it.
 const ORDER: &str = "src/order.ld";
 
 fn main() -> io::Result<()> {
@@ -30,16 +30,16 @@ fn rerun_if_changed(path: &str) {
     println!("cargo::rerun-if-changed={path}");
 }
 
-/// Most of the start-up time is page faults. The linker places the code of a simple command side by side, and packs the
-/// addresses that the dynamic linker relocates. Each option is used only if a test program can be linked with it and
-/// runs: other linkers do not know them, and the C library needs version 2.36 for packed addresses.
+/// Sets linker options that avoid page faults, which take most of the start-up time. The first option places the
+/// functions of a simple command side by side. The second one packs the addresses that the dynamic linker relocates;
+/// the C library supports this from version 2.36 on. An option is used only if a test program links with it, and runs.
 #[allow(clippy::print_stdout, reason = "this is how a build script speaks to cargo")]
 fn link_for_quick_start(order: &Path, out: &Path) -> io::Result<()> {
-    let is = |name: &str, value: &str| env::var(name).is_ok_and(|found| found == value);
+    let has_value = |name: &str, value: &str| env::var(name).is_ok_and(|found| found == value);
     let is_static = env::var("CARGO_CFG_TARGET_FEATURE").is_ok_and(|all| all.split(',').any(|one| one == "crt-static"));
     // A program for another system cannot be run here. The static program has its own order (.ci/static).
     let is_native = env::var_os("HOST") == env::var_os("TARGET");
-    if !is("PROFILE", "release") || !is("CARGO_CFG_TARGET_OS", "linux") || !is_native || is_static {
+    if !has_value("PROFILE", "release") || !has_value("CARGO_CFG_TARGET_OS", "linux") || !is_native || is_static {
         return Ok(());
     }
     for option in [format!("-Wl,-T,{}", order.display()), "-Wl,-z,pack-relative-relocs".to_owned()] {

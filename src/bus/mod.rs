@@ -76,7 +76,7 @@ pub trait Bus: BitRateControl {
         self.now().mono
     }
 
-    /// Whether [`Bus::receive_answer`] waits. After a send, the caller then need not read the clock.
+    /// Whether [`Bus::receive_answer`] waits for an answer. If so, the caller need not read the clock after a send.
     fn waits_without_clock(&self) -> bool {
         false
     }
@@ -101,8 +101,8 @@ pub trait Bus: BitRateControl {
     /// The bus failed. The caller may call again.
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError>;
 
-    /// Like [`Bus::receive`], with a short wait (some 10 ms) that does not read the clock. On some machines, reading the
-    /// clock takes as long as receiving a frame. `None`: no event, or this bus has no such wait.
+    /// Like [`Bus::receive`], but waits for some 10 ms, and does not read the clock: on some machines, this takes as
+    /// long as receiving a frame. Returns `None` if there was no event, or if this bus does not implement the wait.
     ///
     /// # Errors
     /// The bus failed. The caller may call again.

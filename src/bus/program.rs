@@ -43,8 +43,8 @@ impl ShellCommand<'_> {
     /// Runs the command with an argument, and waits for its end. Its standard output is written to standard error.
     ///
     /// # Errors
-    /// It did not end with exit code 0. After a time-out or Ctrl-C, it gets SIGTERM, so that it can end its children. If
-    /// it is still running after 1 s, it is killed.
+    /// The command did not end with exit code 0. After a time-out or Ctrl-C, the command gets SIGTERM, so that it can
+    /// end its children. A command that is still running 1 s later is killed.
     pub fn run(&mut self, argument: &str) -> Result<(), ProgramError> {
         // The bus reports earlier signals.
         while self.interrupts.take() {}
@@ -80,7 +80,7 @@ impl ShellCommand<'_> {
 
 /// Ends a command, if it has not ended already.
 fn end(child: &mut Child) {
-    // Its number may belong to another process after it has ended.
+    // After the command has ended, another process may have its process ID.
     if !matches!(child.try_wait(), Ok(None)) {
         return;
     }
@@ -95,12 +95,12 @@ fn end(child: &mut Child) {
     let _ = child.wait();
 }
 
-/// Sends SIGTERM.
+/// Sends SIGTERM to the command.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "the standard library can only kill")]
 fn terminate(child: &Child) {
     if let Ok(id) = libc::pid_t::try_from(child.id()) {
-        // SAFETY: the call has no memory arguments. The number belongs to the child until it was waited for.
+        // SAFETY: the call accesses no memory. The child keeps its process ID, because it was not waited for yet.
         unsafe { libc::kill(id, libc::SIGTERM) };
     }
 }

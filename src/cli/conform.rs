@@ -23,7 +23,8 @@ use stimulus::StimulusCommand;
 ///
 /// The command runs a list of cases. Each case sends requests, right ones and wrong ones, and compares the answers with
 /// the standard. It prints a verdict for each case: pass, deviates, not-judged or not-applicable. A deviation that the
-/// manual of the device documents is reported as known. The cases of the area "timing" print measured times and no verdict.
+/// manual of the device documents is reported as known. The cases of the area "timing" print measured times and no
+/// verdict.
 ///
 /// The device should be alone on the bus. If other nodes or other traffic are seen, only the areas can be checked that
 /// send nothing to other nodes: --only with all areas except pdo and lss. The command writes only objects of 1000h to
@@ -37,10 +38,11 @@ use stimulus::StimulusCommand;
 /// access, limits and mapping of each object, and with --store its defaults.
 ///
 /// With --stimulus CMD, the first channel with a filter is checked with a step of its input, and the first channel that
-/// can show overloads with a value outside of its measuring range. A failure of CMD, or no end within 60 s, is reported as not-judged. CMD is always run with "normal" at the end.
+/// can show overloads with a value outside of its measuring range. A failure of CMD, or no end within 60 s, is reported
+/// as not-judged. CMD is always run with "normal" at the end.
 ///
-/// Some cases reset the device. Without --store, settings in 2000h to 5FFFh that were not stored are then lost. They are
-/// listed as "not restored" if the object dictionary of the device is known. If the error history (1003h) is not as
+/// Some cases reset the device. Without --store, settings in 2000h to 5FFFh that were not stored are then lost. They
+/// are listed as "not restored" if the object dictionary of the device is known. If the error history (1003h) is not as
 /// before, the last line shows it.
 ///
 /// The exit code is 0 if there is no deviation, or only known ones, and 1 if there is a deviation.

@@ -26,7 +26,8 @@ pub(super) struct ActiveTransfer {
     pub(super) machine: Machine,
     /// The end of the wait for an answer. It is set when our last frame was sent. Other traffic never extends it.
     pub(super) deadline: Option<Mono>,
-    /// When the clock must be read to start the time-out; `None` if it has started. See [`super::send::SendTime`].
+    /// When the clock must be read to start the time-out; `None` if the time-out has started. See
+    /// [`super::send::SendTime`].
     pub(super) read_clock_at: Option<Mono>,
     /// The number of our frames that still wait to be sent.
     pub(super) unsent: usize,

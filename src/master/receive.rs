@@ -1,9 +1,9 @@
-//! Receives the next event, and reads the clock as rarely as possible. On some machines, this takes as long as receiving a
-//! frame.
+//! Receives the next event, and reads the clock as rarely as possible: on some machines, reading the clock takes as
+//! long as receiving a frame.
 //!
 //! After a request of a transfer in progress, the clock is not read. Most answers arrive within some milliseconds. If
-//! none arrives, the clock is read, and the time-out starts then. So a time-out may be some 10 ms too long, but it is
-//! never too short.
+//! no answer arrives, the clock is read, and the time-out starts at this moment. So a time-out may be some 10 ms too
+//! long, but is never too short.
 
 use super::active::ActiveTransfer;
 use super::sdo::SdoClient;
@@ -11,16 +11,16 @@ use super::{Error, Master, Timing};
 use crate::bus::{Event, Mono};
 use std::time::Duration;
 
-/// Before a deadline that is nearer than this, the clock is read: [`crate::bus::Bus::receive_answer`] would wait for too
-/// long.
+/// If a deadline is nearer than this, the clock is read at once, because [`crate::bus::Bus::receive_answer`] may wait
+/// beyond the deadline.
 const ANSWER_WAIT_LIMIT: Duration = Duration::from_millis(40);
 
-/// If frames arrive, but not the answer, the clock is read this much later than the request.
+/// If other frames arrive instead of the answer, the clock is read this long after the request.
 pub(super) const CLOCK_DELAY: Duration = Duration::from_millis(10);
 
 impl Master<'_> {
     /// Waits for the next event until `limit`, or until the next time-out of a transfer. Returns the event with the
-    /// deadline that applied. `None`: the clock was read, and time-outs have started.
+    /// deadline that applied, or `None` after starting time-outs: then call it again.
     pub(super) fn receive(&mut self, limit: Mono) -> Result<Option<(Event, Mono)>, Error> {
         if let Some(received) = self.pending.take() {
             return Ok(Some((Event::Frame(received), limit)));
@@ -47,7 +47,7 @@ impl Master<'_> {
 impl SdoClient {
     /// Whether a time-out has not started yet, because the clock was not read after sending.
     fn awaits_clock(&mut self) -> bool {
-        // Most calls must not search through all nodes.
+        // This flag avoids a search through all nodes in most calls.
         if self.awaits_clock && self.active_transfers().all(|active| active.read_clock_at.is_none()) {
             // The answer has arrived: only later deadlines apply.
             self.awaits_clock = false;
@@ -83,7 +83,7 @@ impl ActiveTransfer {
         self.deadline = Some(deadline);
     }
 
-    /// When the transfer must be looked at, if no frame arrives.
+    /// The end of the wait for an answer, or when the clock must be read to start this wait.
     pub(super) fn due(&self) -> Option<Mono> {
         self.deadline.or(self.read_clock_at)
     }

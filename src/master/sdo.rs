@@ -54,7 +54,7 @@ pub(super) struct SdoClient {
     next_ticket: u64,
     /// A lower bound of the next deadline. It avoids a search through all nodes for each frame.
     due: Option<Mono>,
-    /// Whether a transfer in progress may have [`ActiveTransfer::read_clock_at`].
+    /// Whether [`ActiveTransfer::read_clock_at`] may be set for a transfer in progress.
     pub(super) awaits_clock: bool,
     /// When all transfers together must have ended, and the time that they had.
     limit: Option<(Mono, Duration)>,

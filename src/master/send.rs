@@ -21,9 +21,9 @@ const LONGEST_FRAME_BITS: u32 = 135;
 /// When a frame of a transfer was passed to the bus.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SendTime {
-    /// A moment before.
+    /// A moment before sending.
     pub(super) before: Mono,
-    /// A moment after; `None` if the clock was not read.
+    /// A moment after sending; `None` if the clock was not read.
     pub(super) after: Option<Mono>,
 }
 
@@ -135,7 +135,7 @@ impl Outgoing {
         self.queue.retain(|(_, ticket)| *ticket != Some(removed));
     }
 
-    /// Drops all frames because no node acknowledges. They would be sent too late.
+    /// Drops all frames, because no node acknowledges them. Later, they would be out of date.
     fn drop_all(&mut self, now: Mono, sent: &mut dyn FnMut(Ticket, SendTime)) {
         (self.first, self.full_since) = (None, None);
         let dropped = SendTime { before: now, after: Some(now) };

@@ -31,7 +31,7 @@ pub const LARGE: u32 = 889;
 /// The interval between two progress reports of a transfer.
 const REPORT_INTERVAL: Duration = Duration::from_millis(250);
 
-/// The longest delay of a progress report. Before a deadline that is near, each wait needs more system calls.
+/// The longest delay of a progress report. It avoids waits with a near deadline, which need more system calls.
 const REPORT_DELAY: Duration = Duration::from_millis(50);
 
 /// When block transfer is used.

@@ -133,10 +133,10 @@ impl Report for ResultRow {
     }
 }
 
-/// The shortest text beside the number and the verdict of a case.
+/// The smallest width of the text after the number and the verdict of a case, in characters.
 const MIN_TEXT_WIDTH: usize = 30;
 
-/// Writes a line. On a terminal, it is broken at spaces, and the further lines start below the text.
+/// Writes a line after `head`. If there is a width, the line is broken at spaces, and further lines are indented.
 fn wrap(out: &mut dyn Write, head: &str, line: &str, width: Option<usize>) -> io::Result<()> {
     let indent = head.chars().count();
     let lines = match width {

@@ -216,7 +216,7 @@ impl<R: Report, W: Write> Stream<R, W> {
         self.out.flush()
     }
 
-    /// Prints what follows the last report in text. The other formats have only reports.
+    /// Ends the output. In the text format only, `write` prints further lines after the last report.
     ///
     /// # Errors
     /// `out` cannot be written.

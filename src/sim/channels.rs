@@ -124,7 +124,7 @@ impl Channels {
         let Some(place) = names.iter().position(|name| *name == signal) else {
             return Err(format!("no signal \"{signal}\" (it has: {})", names.join(", ")));
         };
-        // Earlier samples have the old value.
+        // Adds the earlier samples, which have the old value, to the filter.
         self.list[place].filtered(time);
         let quantity = &mut self.list[place].quantity;
         let value = super::bench::value_in(value, Unit(quantity.channel().unit))

@@ -32,7 +32,7 @@ int main(int argc, char **argv)
     }
     struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = if_nametoindex(argv[1])};
     int bus = socket(AF_CAN, SOCK_RAW, CAN_RAW);
-    /* It receives nothing. */
+    /* Without a filter, this socket receives nothing. */
     if (bus < 0 || setsockopt(bus, SOL_CAN_RAW, CAN_RAW_FILTER, NULL, 0) ||
         bind(bus, (struct sockaddr *)&address, sizeof address)) {
         perror(argv[1]);

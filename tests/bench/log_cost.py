@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 
-# Longer recordings are made only once.
+# Recordings that are longer than this number of seconds are made only once.
 LONG = 60
 RUNS = 3
 
@@ -94,16 +94,21 @@ def dump(blast, interface, seconds, directory):
     return sent, took, lost
 
 
+def report(name, sent, seconds, lost, cost, more=""):
+    rate = f"{sent / float(seconds):8.0f} frames/s, {lost} of {sent} lost"
+    print(f"log-cost   {name} {rate}, {cost:.1f} us for each frame{more}", flush=True)
+
+
 def main():
     binary, blast, interface, seconds, directory = sys.argv[1:]
     ratios = []
     for _ in range(RUNS if float(seconds) <= LONG else 1):
         sent, took, lost, (before, after) = record(binary, blast, interface, seconds, directory)
         own = took / (sent - lost) * 1e6
-        print(f"log-cost   cangauge: {sent / float(seconds):8.0f} frames/s, {lost} of {sent} lost, {own:.1f} us for each frame, memory {before:.1f} to {after:.1f} MB")
+        report("cangauge:", sent, seconds, lost, own, f", memory {before:.1f} to {after:.1f} MB")
         sent, took, lost = dump(blast, interface, seconds, directory)
         other = took / (sent - lost) * 1e6
-        print(f"log-cost   candump:  {sent / float(seconds):8.0f} frames/s, {lost} of {sent} lost, {other:.1f} us for each frame", flush=True)
+        report("candump: ", sent, seconds, lost, other)
         ratios.append(own / other)
     print(f"log-cost   cangauge, processor time relative to candump -l (limit 0.40) {statistics.median(ratios):.2f}")
 

@@ -258,7 +258,7 @@ def run_checks(binary, interface, checks, names=()):
             continue
         started = time.monotonic()
         with tempfile.TemporaryDirectory() as directory, tempfile.TemporaryDirectory() as state:
-            # A journal of another run on this computer would make commands refuse.
+            # Commands refuse to run if they find the journal of another run on this computer.
             os.environ["XDG_STATE_HOME"] = state
             try:
                 check(cangauge, directory, *arguments)

@@ -90,7 +90,7 @@ fn eds(kind: &str, changes: &[(&str, &str)]) -> Arc<Eds> {
     Arc::new(cangauge::device::eds::read(text.as_bytes()).expect("an EDS file"))
 }
 
-/// The report with the cases that store settings.
+/// Runs the cases, also those that store settings.
 fn checked(bus: &mut dyn Bus, kind: &str, options: ConformOptions) -> ConformReport {
     run(bus, kind, &ConformOptions { store: true, ..options }).unwrap_or_else(|failure| panic!("{kind}: {failure}"))
 }
@@ -170,7 +170,7 @@ fn each_deviation_is_found_by_no_other_case() {
     each_deviation_is_found(|_| Vec::new());
 }
 
-/// Checks each deviation with the cases of some areas (all areas if there is none): one case finds it, and no other.
+/// Checks that each deviation is found by its case, and by no other case of these areas (all areas if empty).
 fn each_deviation_is_found(areas: fn(&Case) -> Vec<Area>) {
     let rows = [
         table::SDO,
@@ -432,7 +432,7 @@ fn each(count: usize) -> FrameNumbers {
     (SEARCH..count).step_by(1)
 }
 
-/// Interrupts the cases of an area after the chosen ones of all frames. Returns what is not as before.
+/// Interrupts the cases of an area after each chosen frame. Returns the differences from before.
 fn interrupted(kind: &str, area: Area, store: bool, chosen: impl Fn(usize) -> FrameNumbers) -> Vec<String> {
     let file = (area == Area::Eds).then(|| eds(kind, &[]));
     let options = ConformOptions { only: vec![area], store, eds: file, ..ConformOptions::default() };

@@ -13,7 +13,7 @@ use std::time::Duration;
 const TIMEOUT: Duration = Duration::from_millis(100);
 /// The longest wait that does not read the clock.
 const ANSWER_TIME: Duration = Duration::from_millis(10);
-/// How long the program does not run before it sends the last request.
+/// How long the program is interrupted before it sends the last request.
 const PAUSE: Duration = Duration::from_millis(80);
 const SEGMENTS: usize = 100;
 

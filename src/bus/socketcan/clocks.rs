@@ -5,8 +5,8 @@ use std::time::Duration;
 
 /// The time for which a comparison of the clocks is valid. The clocks drift apart by less than 1 ms in this time.
 const COMPARE_INTERVAL: Duration = Duration::from_secs(1);
-/// The shortest time between two comparisons. On a busy machine, the program may be interrupted between reading the
-/// frames and reading the clock. Frames received in this time seem to be too old, although no clock was set.
+/// The shortest time between two comparisons. On a busy machine, the program may be interrupted after reading the
+/// frames and before reading the clock. A frame that arrives meanwhile seems to be too old, although no clock was set.
 const MIN_COMPARE_INTERVAL: Duration = Duration::from_millis(10);
 /// The longest time between two readings for a good comparison.
 const MAX_READING_GAP: Duration = Duration::from_micros(100);
@@ -22,7 +22,7 @@ const JITTER: Duration = Duration::from_millis(1);
 pub(super) struct Clocks {
     /// When the current batch was read.
     read: Mono,
-    /// When the socket was last found empty before this batch.
+    /// When the socket was last found empty before this batch, or the time of the frame before this batch.
     empty_at: Mono,
     /// Whether the current batch left the socket empty.
     emptied: bool,
@@ -40,10 +40,10 @@ impl Clocks {
         self.read = now;
     }
 
-    /// Records a batch that was read after a wait of unknown length, at `latest` at the latest. `last`: the time of the
-    /// last frame before. The socket was empty after that frame.
-    pub(super) fn batch_after_wait(&mut self, last: Mono, latest: Mono) {
-        self.empty_at = self.empty_at.max(last);
+    /// Records a batch that was read after a wait of unknown length, but not later than `latest`. Its frames are not
+    /// older than the frame before, which was received at `previous_frame`.
+    pub(super) fn batch_after_wait(&mut self, previous_frame: Mono, latest: Mono) {
+        self.empty_at = self.empty_at.max(previous_frame);
         (self.read, self.emptied) = (latest, false);
     }
 

@@ -40,11 +40,10 @@ const LINK_CHECK_INTERVAL: Duration = Duration::from_millis(200);
 /// The first wait after a send. It does not read the clock or check for signals. An answer within this time costs one
 /// system call instead of four.
 const ANSWER_TIME: Duration = Duration::from_millis(10);
-
+/// The number of waits of [`ANSWER_TIME`] after a send, if each of them receives a frame: the segments of a block.
+const ANSWERS: u8 = 127;
 /// The clock is read before each wait if the deadline is nearer than this.
 const NEAR_DEADLINE: Duration = Duration::from_millis(30);
-/// The number of such waits after a send, if each of them receives a frame: the segments of a block.
-const ANSWERS: u8 = 127;
 
 /// A CAN interface of the Linux kernel.
 pub struct SocketCan {
@@ -181,12 +180,12 @@ impl SocketCan {
         self.last_clock_reading.get().max(self.last_frame_at)
     }
 
-    /// Reads the frames that the kernel holds for this socket.
-    /// If `wait` is set, waits up to [`ANSWER_TIME`] for the first frame. Returns whether there was a frame.
+    /// Reads the frames that the kernel holds for this socket. If `wait` is set, waits up to [`ANSWER_TIME`] for the
+    /// first frame. Returns whether there was a frame.
     fn fill(&mut self, wait: bool) -> Result<bool, BusError> {
-        // Often there is only one answer: then reading one frame is faster.
-        let most = if wait && self.expected_answers == ANSWERS - 1 { 1 } else { receive::BATCH };
-        match self.batch.fill(self.socket.as_fd(), wait, most) {
+        // The first wait after a send often receives only one answer. Reading one frame is faster than reading a batch.
+        let limit = if wait && self.expected_answers == ANSWERS - 1 { 1 } else { receive::BATCH };
+        match self.batch.fill(self.socket.as_fd(), wait, limit) {
             Ok(count) => {
                 self.is_drained = count < receive::BATCH;
                 if wait {
@@ -206,7 +205,8 @@ impl SocketCan {
                 Some(libc::EAGAIN) => {
                     self.is_drained = true;
                     if wait {
-                        // Such waits go on if a sender only pauses. The clock is read, so that they end before the deadline.
+                        // The sender may only pause, so these waits go on. The clock is read, so that they end before
+                        // the deadline.
                         self.expected_answers = self.expected_answers.saturating_sub(ANSWERS / 4);
                         self.mono();
                     }
@@ -229,8 +229,8 @@ impl SocketCan {
 
     /// Waits for a frame, a signal or the deadline. Returns whether the deadline was reached without an event.
     fn wait(&mut self, deadline: Mono) -> Result<bool, BusError> {
-        // The latest known moment may be too early, so only half of the time is used. On some machines, reading the clock
-        // takes as long as receiving a frame.
+        // The clock is not read here: on some machines, this takes as long as receiving a frame. So the time left may
+        // be shorter than this estimate, and the first wait takes only half of it.
         let estimate = deadline.since(self.latest());
         let left = if estimate > NEAR_DEADLINE { estimate / 2 } else { deadline.since(self.mono()) };
         let limit = if self.is_up { left } else { left.min(LINK_CHECK_INTERVAL) };
@@ -304,7 +304,8 @@ impl SocketCan {
         Ok(())
     }
 
-    /// Waits for the next event until the deadline. Without a deadline, waits up to [`ANSWER_TIME`] after the last send.
+    /// Returns the next event, or `None` at the deadline. Without a deadline, waits up to [`ANSWER_TIME`], and only if
+    /// an answer is expected.
     fn receive_until(&mut self, deadline: Option<Mono>) -> Result<Option<Event>, BusError> {
         let mut has_discarded = false;
         loop {

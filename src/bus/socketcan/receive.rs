@@ -68,22 +68,22 @@ impl Batch {
         None
     }
 
-    /// Reads all waiting frames, up to `most` (at most [`BATCH`]), and returns their number, which is never 0. If `wait`
-    /// is set, waits up to the socket's `SO_RCVTIMEO` for the first frame.
+    /// Reads the waiting frames, up to `limit` (at most [`BATCH`]), and returns their number, which is never 0. If
+    /// `wait` is set, waits up to the socket's `SO_RCVTIMEO` for the first frame.
     ///
     /// # Errors
     /// No frame is waiting, or the socket failed.
     #[expect(unsafe_code, reason = "no safe interface to recvmmsg delivers the drop counter")]
-    pub(super) fn fill(&mut self, socket: BorrowedFd<'_>, wait: bool, most: usize) -> io::Result<usize> {
+    pub(super) fn fill(&mut self, socket: BorrowedFd<'_>, wait: bool, limit: usize) -> io::Result<usize> {
         let flags = if wait { libc::MSG_WAITFORONE } else { libc::MSG_DONTWAIT };
         (self.next, self.count) = (0, 0);
         // SAFETY: all-zero bytes are a valid iovec and mmsghdr: lengths of 0 and null pointers.
         let mut parts: [libc::iovec; BATCH] = unsafe { std::mem::zeroed() };
         // SAFETY: as above.
         let mut headers: [libc::mmsghdr; BATCH] = unsafe { std::mem::zeroed() };
-        let mut vector: libc::c_uint = 0;
-        for ((slot, part), header) in self.slots.iter_mut().zip(&mut parts).zip(&mut headers).take(most) {
-            vector += 1;
+        let mut header_count: libc::c_uint = 0;
+        for ((slot, part), header) in self.slots.iter_mut().zip(&mut parts).zip(&mut headers).take(limit) {
+            header_count += 1;
             part.iov_base = (&raw mut slot.frame).cast();
             part.iov_len = size_of::<libc::can_frame>();
             header.msg_hdr.msg_iov = part;
@@ -94,7 +94,7 @@ impl Batch {
         // SAFETY: each header points to one part and one control buffer, with their actual lengths. `parts` and the
         // slots outlive the call and are not used elsewhere during it. Any bytes are a valid can_frame.
         let received = unsafe {
-            libc::recvmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), vector, flags as _, std::ptr::null_mut())
+            libc::recvmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), header_count, flags as _, std::ptr::null_mut())
         };
         let count = usize::try_from(received).map_err(|_| io::Error::last_os_error())?;
         for (slot, header) in self.slots.iter_mut().zip(&headers).take(count) {

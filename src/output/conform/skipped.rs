@@ -1,4 +1,4 @@
-//! Cases without a result, in text: one line for each reason.
+//! Lists the cases without a result in the text output: one line for each reason.
 
 use super::record::details;
 use super::wrap;
@@ -6,7 +6,7 @@ use crate::output::text;
 use crate::tasks::conform::{CaseResult, Verdict, WhyNot};
 use std::io::{self, Write};
 
-/// Whether a case is listed with the other cases that have the same reason.
+/// Whether a case has no result, and is listed together with the other cases that have the same reason.
 pub(super) fn is_skipped(result: &CaseResult) -> bool {
     let is_without_result = match &result.verdict {
         Verdict::NotApplicable(_) => true,
@@ -37,7 +37,7 @@ pub fn write_skipped(results: &[CaseResult], width: Option<usize>, out: &mut dyn
     Ok(())
 }
 
-/// The numbers of cases. Three or more that follow each other in one area are a range.
+/// Returns the numbers of the cases. Three or more successive cases of one area are joined to a range.
 fn ranges(results: &[CaseResult], places: &[usize]) -> Vec<String> {
     let follows = |a: &usize, b: &usize| *a + 1 == *b && results[*a].case.area == results[*b].case.area;
     let id = |place: &usize| results[*place].case.id.to_owned();

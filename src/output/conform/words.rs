@@ -213,7 +213,7 @@ pub(super) fn why_not(why: &WhyNot) -> String {
     }
 }
 
-/// A setting that LSS could not set again.
+/// The text for a setting that LSS could not set again.
 pub(in crate::output) fn lss_setting(setting: LssSetting) -> String {
     let name = setting.name();
     format!("the old {name} could not be set again by LSS: a reset may activate another one, a power cycle restores it")

@@ -51,7 +51,7 @@ pub(in crate::output) fn effect(node: &str, effect: &ConformEffect) -> NoteText 
     }
 }
 
-/// The error history is not as before.
+/// The text for an error history that is not as before.
 pub(in crate::output) fn history_left(change: &HistoryChange) -> String {
     let (before, after) = (change.before.count, change.after.count);
     let entries = if after == 1 { "1 entry".to_owned() } else { format!("{after} entries") };
@@ -59,7 +59,7 @@ pub(in crate::output) fn history_left(change: &HistoryChange) -> String {
     format!("the error history (0x1003) has {entries} ({before} before){newest}")
 }
 
-/// The input of the device is not as before.
+/// The text for an input of the device that is not as before.
 pub(in crate::output) fn input_left(reason: &StimulusFailure) -> String {
     let normal = Input::Normal.name();
     format!("the input of the device may not be normal: --stimulus {normal}: {}", stimulus_failure(reason))

@@ -1,4 +1,4 @@
-//! When the filters of the channels restart: at the start of the device, and when their objects are written.
+//! Restarts the filters of the channels: at the start of the device, and when an object of a filter is written.
 
 use super::{Channel, Channels};
 use crate::canopen::object::ObjectId;
@@ -9,7 +9,7 @@ use std::time::Duration;
 /// The object with the time between two samples in microseconds (CiA 404).
 const SAMPLE_TIME: u16 = 0x6114;
 
-/// A shorter sample time would only slow down the simulation.
+/// The lowest sample time. A shorter one would only slow down the simulation.
 const SHORTEST_SAMPLE: Duration = Duration::from_micros(100);
 
 impl Channels {

@@ -192,7 +192,7 @@ fn time_of_step(sample_us: u32) -> Option<Duration> {
     write(&mut objects, &mut channels, "61A1:1", &[4, 0]);
     write(&mut objects, &mut channels, "61A0:1", &[2]);
     write(&mut objects, &mut channels, "6114:1", &sample_us.to_le_bytes());
-    // The mean that contains the step was not read since its start.
+    // Since the start of the mean that contains the step, no value was read.
     let step = AT + Duration::from_millis(99);
     channels.hold("pressure", "9bar", step).expect("a value");
     let times = (0..200).map(Duration::from_millis);

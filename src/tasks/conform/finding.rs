@@ -318,7 +318,8 @@ impl Finding {
         Finding { object: Some(object), expected, seen }
     }
 
-    /// The finding if a value differs from the expected one by more than `tolerance`. All are in the unit of the channel.
+    /// The finding if a value differs from the expected one by more than `tolerance`. All are in the unit of the
+    /// channel.
     pub(super) fn measured(object: ObjectId, expected: f64, tolerance: f64, seen: f64) -> Option<Finding> {
         let is_wrong = (seen - expected).abs() > tolerance;
         let expected = Expected::Measured { value: expected, tolerance };

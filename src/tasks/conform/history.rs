@@ -31,8 +31,8 @@ impl Session<'_, '_> {
         Ok(Some(ErrorEntries { count, newest }))
     }
 
-    /// Compares the error history with the history before the first case. Cases delete the entries that they cause. So a
-    /// difference is an error that no case has expected, or a reset has deleted entries.
+    /// Compares the error history with the history before the first case. Cases delete the entries that they cause. So
+    /// a difference is an error that no case has expected, or a reset has deleted entries.
     pub(super) fn history_change(&mut self) -> Result<Option<HistoryChange>, Error> {
         let Some(before) = self.settings.history else { return Ok(None) };
         let after = self.despite_interrupts(Self::error_entries)?;

@@ -34,7 +34,7 @@ fn integer(frame: Frame, object: [u8; 3], change: fn(i16) -> i16) -> Vec<Frame> 
     }
 }
 
-/// Takes a written value for another one.
+/// Replaces a value that is written to this object.
 fn written_as(frame: Frame, object: [u8; 3], value: u32, other: u32) -> Frame {
     match frame.data() {
         [0x22..=0x2f, x, y, z, a, b, c, d]

@@ -1,4 +1,5 @@
-//! The filter (61A0h, 61A1h) without a change of the input: rejected types, and the mean. The step response is in `step`.
+//! The filter (61A0h, 61A1h) without a change of the input: rejected types, and the mean. The step response is in
+//! `step`.
 
 use super::super::case::{Area, Case, Run, Severity::*};
 use super::super::codes;

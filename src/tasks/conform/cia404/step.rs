@@ -57,8 +57,8 @@ pub(in super::super) const CASES: &[Case] = &[
 const FILTER: &str = "CiA 404, objects 61A0h and 61A1h";
 const SAMPLE_TIME: u16 = 0x6114;
 
-/// The filter constants that are tried until the response is much slower than the input. The last constant is for sample
-/// times of 0.05 ms.
+/// The filter constants that are tried until the response is much slower than the input. The last constant is for
+/// sample times of 0.05 ms.
 const CONSTANTS: [u16; 5] = [16, 64, 250, 1000, 8000];
 
 /// The time between two readings.
@@ -232,8 +232,8 @@ impl Subject {
         (value - self.from) / (self.to - self.from)
     }
 
-    /// Sets the filter, waits for `ready_after`, makes the step, and records the values until the device shows this share
-    /// of the step.
+    /// Sets the filter, waits for `ready_after`, makes the step, and records the values until the device shows this
+    /// share of the step.
     fn respond(
         &self,
         session: &mut Session<'_, '_>,
@@ -280,8 +280,8 @@ impl Subject {
         }
     }
 
-    /// Finds a moving average whose response is slow enough for a verdict. Returns the filter constant, the response, and
-    /// the time to the middle of the step.
+    /// Finds a moving average whose response is slow enough for a verdict. Returns the filter constant, the response,
+    /// and the time to the middle of the step.
     fn slow_response(&self, session: &mut Session<'_, '_>) -> OrVerdict<(u16, Response, Duration)> {
         let object = self.channel.object(CONSTANT);
         let mut last = None;
@@ -333,8 +333,8 @@ fn moving(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
     let subject = or_verdict!(subject(session));
     let (constant, response, half) = or_verdict!(subject.slow_response(session));
     let object = subject.channel.object(CONSTANT);
-    // Relative to the time of 50 %, the moving average of CiA 404 (a part of the difference is added to the value) shows
-    // 25 % after 0.42, and 75 % after 2. The mean of the last N samples shows 25 % after 0.5, and 75 % after 1.5.
+    // Relative to the time of 50 %, the moving average of CiA 404 (a part of the difference is added to the value)
+    // shows 25 % after 0.42, and 75 % after 2. The mean of the last N samples shows 25 % after 0.5, and 75 % after 1.5.
     let shape = [(25, 0.35, 0.6), (75, 1.3, 2.3)];
     let mut findings: Vec<Finding> = shape
         .into_iter()
