@@ -207,7 +207,7 @@ fn hostile_servers_get_no_row_taken_away() {
         publish(&bench, &format!("run.csv --to {}", good.url())).exit(0);
         assert_eq!(good.lines().len(), 3, "{name}");
     };
-    // At once: some of them wait for an answer in time.
+    // In parallel, because some of them wait for an answer until a time-out.
     thread::scope(|scope| cases.into_iter().for_each(|case| drop(scope.spawn(|| check(case)))));
 }
 

@@ -66,7 +66,7 @@ fn wrong_answer(code: u8, is_accepted: bool, answer: Frame) -> Finding {
 }
 
 /// Like [`prepare_rates`], for cases that send codes that the device may accept. After the case, the present bit rate
-/// is set, which ends automatic detection. So a device that can detect the bit rate gets a verdict here.
+/// is set, which ends automatic detection. So a device that can detect the bit rate is not checked.
 fn prepare_accepted(session: &mut Session<'_, '_>) -> Result<Option<Verdict>, Error> {
     if session.rate_table().auto().is_some() {
         return Ok(Some(Verdict::NotApplicable(WhyNot::DetectsBitRate { was_set: false })));
