@@ -61,6 +61,9 @@ const SAMPLE_TIME: u16 = 0x6114;
 /// sample times of 0.05 ms.
 const CONSTANTS: [u16; 5] = [16, 64, 250, 1000, 8000];
 
+/// With the last constant and a sample time of 0.05 ms, the middle of the step is reached after this time.
+const SHORTEST_LAST_RESPONSE: Duration = Duration::from_millis(200);
+
 /// The time between two readings.
 const POLL: Duration = Duration::from_millis(5);
 
@@ -302,10 +305,11 @@ impl Subject {
             }
             last = Some((constant, half, response.uncertainty));
         }
-        // Even the largest constant has no effect.
+        // Even the largest constant has no effect. After a slow command, a short response could not be seen.
         if let Some((constant, half, uncertainty)) = last
             && constant == CONSTANTS[CONSTANTS.len() - 1]
             && half <= uncertainty
+            && uncertainty < SHORTEST_LAST_RESPONSE
         {
             let expected = Expected::Step { percent: 50, from: uncertainty, until: RESPONSE_LIMIT };
             return Ok(Err(Verdict::of([Finding::at(object, expected, Seen::StepAfter(Some(half)))])));
