@@ -7,8 +7,10 @@ use cangauge::canopen::id::NodeId;
 use cangauge::device::eds::{self, Eds};
 use std::collections::HashSet;
 use std::fmt::Write as _;
+use std::ops::Range;
 use std::panic::catch_unwind;
 use std::path::Path;
+use std::thread;
 use std::time::{Duration, Instant};
 
 const FILES: u64 = 10_000;
@@ -148,9 +150,23 @@ fn check(eds: &Eds, file: &[u8]) {
 #[test]
 fn damaged_files_cause_no_panic_and_no_hang() {
     let originals = originals();
+    let (used, warned) = thread::scope(|scope| {
+        let halves = [0..FILES / 2, FILES / 2..FILES];
+        let threads = halves.map(|seeds| scope.spawn(|| read_damaged(&originals, seeds)));
+        threads.into_iter().fold((0, 0), |(used, warned), thread| {
+            let (more_used, more_warned) = thread.join().expect("no panic");
+            (used + more_used, warned + more_warned)
+        })
+    });
+    // Most damaged files must still be usable and have warnings, else the test proves nothing.
+    assert!(used > 7_000 && warned > 6_000, "{used} files used, {warned} with warnings");
+}
+
+/// Reads the damaged files of these seeds. Returns how many are usable, and how many of these have warnings.
+fn read_damaged(originals: &[Vec<u8>], seeds: Range<u64>) -> (usize, usize) {
     let (mut used, mut warned) = (0, 0);
-    for seed in 0..FILES {
-        let file = mutated(&originals, seed);
+    for seed in seeds {
+        let file = mutated(originals, seed);
         let start = Instant::now();
         let result = catch_unwind(|| {
             let result = eds::read(&file);
@@ -165,8 +181,7 @@ fn damaged_files_cause_no_panic_and_no_hang() {
         used += usize::from(result.is_ok());
         warned += usize::from(result.is_ok_and(|eds| !eds.warnings.is_empty()));
     }
-    // Most damaged files must still be usable and have warnings, else the test proves nothing.
-    assert!(used > 7_000 && warned > 6_000, "{used} files used, {warned} with warnings");
+    (used, warned)
 }
 
 #[test]

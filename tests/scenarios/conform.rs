@@ -338,9 +338,9 @@ fn bit_rate_that_could_not_be_set_again_is_not_changed() {
 fn an_interrupted_check_restores_the_device() {
     for area in Area::ALL {
         for kind in ["mh4", "d20", "mc1609", "dps"] {
-            let step = if kind == "mh4" { 23 } else { 151 };
+            let step = if kind == "mh4" { 37 } else { 151 };
             let store = matches!(area, Area::Eds | Area::Lss);
-            let wrong = interrupted(kind, area, store, |count| (SEARCH..count).step_by(step.max(count / 25)));
+            let wrong = interrupted(kind, area, store, |count| (SEARCH..count).step_by(step.max(count / 15)));
             assert_eq!(wrong, [""; 0]);
         }
     }
