@@ -44,6 +44,8 @@ const ANSWER_TIME: Duration = Duration::from_millis(10);
 const ANSWERS: u8 = 127;
 /// The clock is read before each wait if the deadline is nearer than this.
 const NEAR_DEADLINE: Duration = Duration::from_millis(30);
+/// The longest wait without reading the clock. A program that was stopped for some time may be nearer to the deadline.
+const LONGEST_BLIND_WAIT: Duration = Duration::from_millis(200);
 
 /// A CAN interface of the Linux kernel.
 pub struct SocketCan {
@@ -232,7 +234,8 @@ impl SocketCan {
         // The clock is not read here: on some machines, this takes as long as receiving a frame. So the time left may
         // be shorter than this estimate, and the first wait takes only half of it.
         let estimate = deadline.since(self.latest());
-        let left = if estimate > NEAR_DEADLINE { estimate / 2 } else { deadline.since(self.mono()) };
+        let left =
+            if estimate > NEAR_DEADLINE { (estimate / 2).min(LONGEST_BLIND_WAIT) } else { deadline.since(self.mono()) };
         let limit = if self.is_up { left } else { left.min(LINK_CHECK_INTERVAL) };
         // A socket without an interface receives nothing.
         let ready = if self.is_removed {
