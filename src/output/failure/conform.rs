@@ -26,7 +26,7 @@ pub(super) fn words(failure: &Failure, cause: &ConformFailure) -> CauseText {
                 }
             };
             CauseText::new(format!("{seen}: nothing was changed")).hint(format!(
-                "disconnect them, or check only areas without pdo and lss: cangauge conform {node} --only sdo,nmt"
+                "disconnect them, or check only areas other than pdo and lss: cangauge conform {node} --only sdo,nmt"
             ))
         }
     }
@@ -41,6 +41,9 @@ pub(in crate::output) fn effect(node: &str, effect: &ConformEffect) -> NoteText 
         }
         ConformEffect::Unknown => {
             NoteText::new("not-restored", "the settings could not be restored").command("undo", undo)
+        }
+        ConformEffect::HistoryUnknown => {
+            NoteText::new("error-history", "the error history (1003h) could not be read at the end")
         }
         ConformEffect::HistoryChanged(change) => NoteText::new("error-history", history_left(change)),
         ConformEffect::LssNotRestored(settings) => {

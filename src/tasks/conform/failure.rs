@@ -39,6 +39,8 @@ pub enum ConformEffect {
     NotRestored(Vec<ObjectId>),
     /// The settings could not be read back.
     Unknown,
+    /// The error history could not be read at the end.
+    HistoryUnknown,
     /// The error history is not as before.
     HistoryChanged(HistoryChange),
     /// LSS has changed these settings, and could not set the old values again.

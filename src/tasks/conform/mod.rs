@@ -183,13 +183,12 @@ pub fn conform(
         journal.finish();
     }
     let Session { node, input_failure, lss_pending, .. } = session;
-    let lss_not_restored = lss_pending.failed;
-    let (history, state) = match history {
-        Ok(history) => (history, state),
-        Err(error) => (None, state.and(Err(error))),
+    let of_history = match &history {
+        Ok(change) => change.map(ConformEffect::HistoryChanged),
+        Err(_) => Some(ConformEffect::HistoryUnknown),
     };
-    let failure = match (run, restored, state) {
-        (Ok(results), Ok(not_restored), Ok(state)) => {
+    let failure = match (run, restored, state, history) {
+        (Ok(results), Ok(not_restored), Ok(state), Ok(history)) => {
             return Ok(ConformReport {
                 node,
                 started,
@@ -197,18 +196,20 @@ pub fn conform(
                 results,
                 not_restored,
                 history,
-                lss_not_restored,
+                lss_not_restored: lss_pending.failed,
                 state,
                 input_failure,
             });
         }
-        (Ok(_), Err(error), _) | (Ok(_), Ok(_), Err(error)) => Failure::from(error).with(id, ConformEffect::Unknown),
-        (Err(failure), Ok(objects), _) if objects.is_empty() => failure,
-        (Err(failure), Ok(objects), _) => failure.with(id, ConformEffect::NotRestored(objects)),
-        (Err(failure), Err(_), _) => failure.with(id, ConformEffect::Unknown),
+        (Ok(_), Ok(_), Ok(_), Err(error)) => Failure::from(error),
+        (Ok(_), Err(error), ..) | (Ok(_), Ok(_), Err(error), _) => {
+            Failure::from(error).with(id, ConformEffect::Unknown)
+        }
+        (Err(failure), Ok(objects), ..) if objects.is_empty() => failure,
+        (Err(failure), Ok(objects), ..) => failure.with(id, ConformEffect::NotRestored(objects)),
+        (Err(failure), Err(_), ..) => failure.with(id, ConformEffect::Unknown),
     };
-    let of_history = history.map(ConformEffect::HistoryChanged);
-    let of_lss = (!lss_not_restored.is_empty()).then_some(ConformEffect::LssNotRestored(lss_not_restored));
+    let of_lss = (!lss_pending.failed.is_empty()).then_some(ConformEffect::LssNotRestored(lss_pending.failed));
     let effects = of_history.into_iter().chain(of_lss).chain(input_failure.map(ConformEffect::InputNotNormal));
     Err(effects.fold(failure, |failure, effect| failure.with(id, effect)))
 }
