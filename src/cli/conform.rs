@@ -26,8 +26,8 @@ use stimulus::StimulusCommand;
 /// manual of the device documents is reported as known. The cases of the area "timing" print measured times and no
 /// verdict.
 ///
-/// The device should be alone on the bus. If other nodes or other traffic are seen, only the areas can be checked that
-/// send nothing to other nodes: --only with all areas except pdo and lss. The command writes only objects of 1000h to
+/// The device should be alone on the bus. If other nodes or other traffic are seen, only areas other than pdo and
+/// lss can be checked (--only): they send nothing to other nodes. The command writes only objects of 1000h to
 /// 1FFFh and settings of the device profile. Afterwards all settings and the NMT state are as before.
 ///
 /// With --store, the command also stores settings, restores factory defaults, stores the present node-ID and bit rate

@@ -41,7 +41,7 @@ fn other_nodes_are_a_reason_to_refuse() {
     assert_eq!(
         done.stderr,
         "cangauge: node 1: node 127 is on the bus, too: nothing was changed\n\
-         hint: disconnect them, or check only areas without pdo and lss: cangauge conform 1 --only sdo,nmt\n"
+         hint: disconnect them, or check only areas other than pdo and lss: cangauge conform 1 --only sdo,nmt\n"
     );
     bench.run("conform 1 --only sdo,nmt").exit(0);
     bench.run("conform 1 --only sdo,pdo").exit(1);

@@ -325,12 +325,30 @@ fn bit_rate_that_could_not_be_set_again_is_not_changed() {
         };
         (codes.collect::<Vec<_>>(), reason)
     };
-    // The MH-4 can detect the bit rate; 100 kbit/s has no code. The reserved codes come from LSS-26.
+    // The MH-4 can detect the bit rate; 100 kbit/s has no code. The reserved codes come from LSS-26 and LSS-29.
     let detects = |was_set| format!("DetectsBitRate {{ was_set: {was_set} }}");
     assert_eq!(sent_and_why(250_000, "mh4", None), (vec![5, 10, 255], detects(false)));
     assert_eq!(sent_and_why(100_000, "mc1609", None), (vec![], "UnknownBitRate".to_owned()));
     let (codes, why) = sent_and_why(250_000, "mc1609", Some(accepts_detection));
-    assert_eq!((codes, why), (vec![5, 10, 255, 9, 3], detects(true)));
+    assert_eq!((codes, why), (vec![5, 9, 3, 10, 255], detects(true)));
+}
+
+#[test]
+fn fixed_bit_rate_that_ends_automatic_detection_is_not_stored() {
+    let accepts_reserved = Deviation::Sends(|memory, frame| {
+        let is_answer = frame.id() == CanId::LSS_SLAVE && memory.lss[..2] == [0x13, 1];
+        vec![if is_answer { Frame::full(CanId::LSS_SLAVE, [0x13, 0, 0, 0, 0, 0, 0, 0]) } else { frame }]
+    });
+    let options = ConformOptions { only: vec![Area::Lss], store: true, ..ConformOptions::default() };
+    // The MH-4 can detect the bit rate.
+    for (kind, deviation, is_stored) in
+        [("mh4", None, true), ("mh4", Some(accepts_reserved), false), ("mc1609", Some(accepts_reserved), true)]
+    {
+        let mut bus = FaultyBus::new(bus_at(250_000, kind, deviation), Fault::None, 0);
+        run(&mut bus, kind, &options).expect("a report");
+        let is_store = |frame: &Frame| frame.id() == CanId::LSS_MASTER && frame.data()[0] == 0x17;
+        assert_eq!(bus.sent.iter().any(is_store), is_stored, "{kind}");
+    }
 }
 
 /// Ctrl-C after some frames of each area. The device has its old settings and its old state.

@@ -188,7 +188,7 @@ pub(super) fn why_not(why: &WhyNot) -> String {
                 .to_owned()
         }
         WhyNot::DetectsBitRate { was_set: true } => {
-            "the device accepts automatic bit rate detection (code 9): if it was active, the present bit rate is used \
+            "the device may have automatic bit rate detection: if it was active, the present bit rate now replaces it \
              until the next power-on"
                 .to_owned()
         }
@@ -203,7 +203,9 @@ pub(super) fn why_not(why: &WhyNot) -> String {
         WhyNot::Rejected(object, code) => format!("{object}: the device rejected the write: {code}"),
         WhyNot::NotMoved(object) => format!("{object} did not change enough"),
         WhyNot::NotReturned(object) => format!("{object} did not return to its value before the step"),
-        WhyNot::StepTooSlow => "the step of the input takes longer than the filter".to_owned(),
+        WhyNot::StepTooSlow => {
+            "no filter constant gives a response that can be judged: the step or the filter is too slow".to_owned()
+        }
         WhyNot::MovedEarly(object) => format!("{object} crossed the limit too early, by itself"),
         WhyNot::NearZero(object) => format!("{object} is too close to zero"),
         WhyNot::NoValidValue(object) => format!("{object} is not valid, or at the end of its range"),

@@ -111,14 +111,9 @@ pub(super) const CASES: &[Case] = &[
     case("LSS-25", "After a store and a reset, the device has its node-ID", CONFIGURE, configuration::keeps_node_id)
         .matters(High, "The device has another node-ID after a restart and is lost.")
         .stores(),
-    case(
-        "LSS-26",
-        "The reserved codes 5, 10 and 255 of the table of bit rates are rejected",
-        RATES,
-        rates::reserved_codes,
-    )
-    .matters(Medium, "The device gets an unknown bit rate and is lost.")
-    .stores(),
+    case("LSS-26", "The reserved code 5 of the table of bit rates is rejected", RATES, rates::reserved_code)
+        .matters(Medium, "The device gets an unknown bit rate and is lost.")
+        .stores(),
     case(
         "LSS-27",
         "The present bit rate is accepted, and each other code of the table is accepted or rejected",
@@ -129,6 +124,9 @@ pub(super) const CASES: &[Case] = &[
     .stores(),
     case("LSS-28", "The device accepts the bit rates of the EDS file, and no others", RATES, rates::of_file)
         .matters(Medium, "Tools offer a bit rate that the device does not have, or do not offer one that it has.")
+        .stores(),
+    case("LSS-29", "The reserved codes 10 and 255 of the table of bit rates are rejected", RATES, rates::high_codes)
+        .matters(Medium, "The device gets an unknown bit rate and is lost.")
         .stores(),
 ];
 

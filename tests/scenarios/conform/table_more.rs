@@ -303,6 +303,11 @@ pub(super) const LSS: &[Row] = &[
     (
         "mh4",
         "LSS-26",
+        Sends(|memory, frame| if memory.lss[2] == 5 { lss(frame, 0x13, |data| data[1] = 0) } else { vec![frame] }),
+    ),
+    (
+        "mh4",
+        "LSS-29",
         Sends(|memory, frame| if memory.lss[2] == 10 { lss(frame, 0x13, |data| data[1] = 0) } else { vec![frame] }),
     ),
     (

@@ -262,7 +262,10 @@ fn limit(session: &mut Session<'_, '_>, distance: u16, direction: f64) -> Result
     let limit = events.present.middle() + 2.0 * direction * events.change;
     let is_beyond = |now: Readings| (now.middle() - limit) * direction > 0.0;
     // The value may have crossed the limit while the parameters were written.
-    if session.readings(events.value, events.data_type, events.digits)?.is_none_or(is_beyond) {
+    let Some(now) = session.readings(events.value, events.data_type, events.digits)? else {
+        return Ok(Verdict::not_judged(WhyNot::NoValidValue(events.value)));
+    };
+    if is_beyond(now) {
         return Ok(Verdict::not_judged(WhyNot::MovedEarly(events.value)));
     }
     let count = count_after_move(session, &events, MOVE * direction * events.change)?;

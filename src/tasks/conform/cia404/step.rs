@@ -31,7 +31,7 @@ pub(in super::super) const CASES: &[Case] = &[
     .stimulated(),
     case(
         "404-33",
-        "With filter type 2, a step is shown by the next two means over the number of samples in 61A1h",
+        "With filter type 2, the value shows a step after two means over the number of samples in 61A1h",
         FILTER,
         repeating,
     )
@@ -39,7 +39,7 @@ pub(in super::super) const CASES: &[Case] = &[
     .stimulated(),
     case(
         "404-34",
-        "Twice the sample time (6114h) can be read back, or its write is rejected because of the value",
+        "Twice the sample time (6114h) can be read back, or the write is rejected with an abort code for the value",
         "CiA 404, object 6114h",
         read_back,
     )
@@ -63,6 +63,9 @@ const CONSTANTS: [u16; 5] = [16, 64, 250, 1000, 8000];
 
 /// With the last constant and a sample time of 0.05 ms, the middle of the step is reached after this time.
 const SHORTEST_LAST_RESPONSE: Duration = Duration::from_millis(200);
+
+/// The time in which a device takes enough samples for the largest filter constant to have an effect.
+const FIRST_SAMPLES: Duration = Duration::from_secs(3);
 
 /// The time between two readings.
 const POLL: Duration = Duration::from_millis(5);
@@ -311,8 +314,16 @@ impl Subject {
             && half <= uncertainty
             && uncertainty < SHORTEST_LAST_RESPONSE
         {
-            let expected = Expected::Step { percent: 50, from: uncertainty, until: RESPONSE_LIMIT };
-            return Ok(Err(Verdict::of([Finding::at(object, expected, Seen::StepAfter(Some(half)))])));
+            // A device may begin a new average when the constant is written. It then needs some samples.
+            let response = match self.respond(session, 1, constant, 0.5, FIRST_SAMPLES)? {
+                Ok(response) => response,
+                Err(verdict) => return Ok(Err(verdict)),
+            };
+            let seen = response.time(0.5).map(|half| half.saturating_sub(self.base_time));
+            if seen.is_some_and(|half| half <= response.uncertainty) {
+                let expected = Expected::Step { percent: 50, from: response.uncertainty, until: RESPONSE_LIMIT };
+                return Ok(Err(Verdict::of([Finding::at(object, expected, Seen::StepAfter(seen))])));
+            }
         }
         Ok(Err(Verdict::not_judged(WhyNot::StepTooSlow)))
     }

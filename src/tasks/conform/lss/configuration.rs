@@ -58,6 +58,10 @@ pub(super) fn form(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
 /// The bit rate is not set: a device that detects the bit rate would then store a fixed bit rate.
 fn store_present(session: &mut Session<'_, '_>) -> Result<Result<Frame, Box<Verdict>>, Error> {
     let not_applicable = |why| Ok(Err(Box::new(Verdict::NotApplicable(why))));
+    // A case has sent a reserved bit rate, and the device has not rejected it.
+    if session.may_store_fixed_rate() {
+        return Ok(Err(Box::new(Verdict::not_judged(WhyNot::DetectsBitRate { was_set: true }))));
+    }
     if !enter_configuration(session)? {
         return Ok(Err(Box::new(NO_LSS)));
     }

@@ -32,6 +32,8 @@ impl LssSetting {
 pub(in super::super) struct PendingSettings {
     /// The settings that may have a new value, and whether the device has acknowledged a new value.
     sent: BTreeMap<LssSetting, bool>,
+    /// Whether the present bit rate was set again. This ends automatic detection.
+    was_rate_set: bool,
     /// The settings that could not be set again.
     pub(in super::super) failed: Vec<LssSetting>,
 }
@@ -61,6 +63,11 @@ impl Session<'_, '_> {
         self.rate_table().index_of(self.master.bus().bit_rate()?)
     }
 
+    /// Whether a store could end automatic detection of the bit rate for good.
+    pub(super) fn may_store_fixed_rate(&self) -> bool {
+        self.lss_pending.was_rate_set && (self.node.model.is_none() || self.rate_table().auto().is_some())
+    }
+
     /// The bit rates of the device for LSS.
     pub(super) fn rate_table(&self) -> RateTable {
         RateTable::of(self.node.model.as_ref().map(|model| &model.description), AssignKind::Lss)
@@ -76,6 +83,7 @@ impl Session<'_, '_> {
                 LssSetting::NodeId => Some([0x11, self.node.id.get(), 0]),
                 LssSetting::BitRate => self.present_rate_code().map(|code| [0x13, 0, code]),
             };
+            self.lss_pending.was_rate_set |= setting == LssSetting::BitRate;
             let answer = request.map(|request| self.lss(&request)).transpose()?.flatten();
             let is_set = request.zip(answer).is_some_and(|(request, frame)| is_accepted(&frame, request[0]));
             // A device that answers neither request does not have the service.

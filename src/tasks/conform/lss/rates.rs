@@ -7,8 +7,11 @@ use super::{NO_LSS, TIMEOUT, enter_configuration, is_accepted, is_rejected};
 use crate::canopen::frame::Frame;
 use crate::node::Error;
 
-/// Reserved codes, which no device may accept. 10 and 255 stand for all codes from 10 to 255.
-const RESERVED: [u8; 3] = [5, 10, 255];
+/// The reserved code between those with a bit rate. Some devices use it for 100 kbit/s.
+const RESERVED: [u8; 1] = [5];
+
+/// These codes stand for all reserved codes from 10 to 255.
+const HIGH: [u8; 2] = [10, 255];
 
 /// The codes of table 0 with a bit rate.
 const CODES: [u8; 8] = [0, 1, 2, 3, 4, 6, 7, 8];
@@ -46,12 +49,21 @@ pub(super) fn reserved_table(session: &mut Session<'_, '_>) -> Result<Verdict, E
     })
 }
 
-pub(super) fn reserved_codes(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+pub(super) fn reserved_code(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+    rejected(session, &RESERVED)
+}
+
+pub(super) fn high_codes(session: &mut Session<'_, '_>) -> Result<Verdict, Error> {
+    rejected(session, &HIGH)
+}
+
+/// The device rejects these codes.
+fn rejected(session: &mut Session<'_, '_>, codes: &[u8]) -> Result<Verdict, Error> {
     if let Some(verdict) = prepare_rates(session)? {
         return Ok(verdict);
     }
     let mut findings = Vec::new();
-    for code in RESERVED {
+    for &code in codes {
         match session.configure_rate(code)? {
             Some(frame) if is_rejected(&frame, 0x13) => {}
             Some(frame) => findings.push(wrong_answer(code, false, frame)),
