@@ -1,7 +1,7 @@
 //! `cangauge`: find, configure, check and record CANopen measuring devices (CiA 404).
 //!
 //! This crate is a library and a command line program. A program that uses only the library sets `default-features =
-//! false`, because the feature `cli` contains the command line and its dependencies.
+//! false`, because the feature `cli` contains the output of the program, and the dependencies of its command line.
 //!
 //! # Layers
 //!
@@ -26,8 +26,11 @@
 //!   and cells of recordings and line protocol are always built; the rest needs the feature `publish`.
 //! - [`output`] → tasks (reports), publish (reports), node, measure, device, canopen (values), bus (time types,
 //!   faults). All sentences, tables and file formats. Part of the feature `cli`.
-//! - [`cli`] → tasks, output, publish, node, measure, master, sim, bus, device, canopen (values). Arguments and help
-//!   texts, one file for each command. Part of the feature `cli`.
+//!
+//! The program (`src/main.rs`) adds one layer. It is not part of the library, so that a change of it is built quickly:
+//!
+//! - `cli` → tasks, output, publish, node, measure, master, sim, bus, device, canopen (values). Arguments and help
+//!   texts, one file for each command.
 //!
 //! # Read a sensor
 //!
@@ -106,9 +109,6 @@
 
 pub mod bus;
 pub mod canopen;
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub mod cli;
 pub mod device;
 pub mod master;
 pub mod measure;

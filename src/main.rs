@@ -1,6 +1,9 @@
 //! The program: parses the arguments, runs the command, and returns the exit code.
 
-use cangauge::cli::{exit, parse, run};
+// Public, so that the compiler checks its documentation.
+pub mod cli;
+
+use crate::cli::{exit, parse, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

@@ -67,8 +67,9 @@ impl FromStr for NodeId {
     }
 }
 
-/// Parses an unsigned number that a user typed: decimal, or hexadecimal with `0x`.
-pub(crate) fn parse_u32(text: &str) -> Option<u32> {
+/// Parses an unsigned number that a user typed: decimal, or hexadecimal with `0x`. Returns `None` if the text is no
+/// such number, or if the number has more than 32 bits.
+pub fn parse_u32(text: &str) -> Option<u32> {
     let digits_only = |digits: &str| !digits.is_empty() && !digits.starts_with('+');
     match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
         Some(hex) if digits_only(hex) => u32::from_str_radix(hex, 16).ok(),

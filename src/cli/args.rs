@@ -1,15 +1,12 @@
 //! Types of arguments: nodes, signals, objects, durations. Arguments are checked here, before a bus is opened.
 
-use crate::bus::claim::Claim;
-use crate::bus::remote::Remote;
-use crate::canopen::id::{CanId, NodeId, bit_rate, parse_u32};
-use crate::canopen::object::ObjectId;
-use crate::canopen::value::DataType;
-use crate::measure::decode::Wanted;
-use crate::output::report::Format;
-use crate::output::rows::CHOICES;
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
+use cangauge::bus::claim::Claim;
+use cangauge::bus::remote::Remote;
+use cangauge::canopen::id::{CanId, NodeId, bit_rate, parse_u32};
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::value::DataType;
+use cangauge::measure::decode::Wanted;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
@@ -239,14 +236,13 @@ impl fmt::Display for BusSpec {
     }
 }
 
-impl ValueEnum for Format {
-    fn value_variants<'a>() -> &'a [Format] {
-        CHOICES
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()))
-    }
+/// Returns a parser for one of these values. The help and the completions list their names.
+pub(super) fn one_of<T>(values: &'static [T], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T>
+where
+    T: Copy + Send + Sync + 'static,
+{
+    let names = PossibleValuesParser::new(values.iter().map(|value| name(*value)));
+    names.try_map(move |text| values.iter().copied().find(|value| name(*value) == text).ok_or("an unknown name"))
 }
 
 /// A tag: `part=P107`.

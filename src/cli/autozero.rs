@@ -3,16 +3,16 @@
 use super::Global;
 use super::args::Nodes;
 use super::nodes::on_each_node;
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::device::unit::Unit;
-use crate::master::Master;
-use crate::node::Overrides;
-use crate::output::autozero::ZeroReport;
-use crate::output::notes;
-use crate::tasks::autozero::{AutozeroFailure, AutozeroReport, Limit, Options, ZeroTarget, autozero};
-use crate::tasks::failure::Cause;
-use crate::tasks::{Failure, Kind};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::device::unit::Unit;
+use cangauge::master::Master;
+use cangauge::node::Overrides;
+use cangauge::output::autozero::ZeroReport;
+use cangauge::output::notes;
+use cangauge::tasks::autozero::{AutozeroFailure, AutozeroReport, Limit, Options, ZeroTarget, autozero};
+use cangauge::tasks::failure::Cause;
+use cangauge::tasks::{Failure, Kind};
 use clap::Args;
 
 /// Set the zero of a channel (6125h), with checks before and after

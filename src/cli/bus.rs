@@ -5,13 +5,13 @@ pub(super) mod host;
 use super::args::{BitRate, BusSpec, Duration, InterfaceName};
 use super::exit::IntoFailure;
 use super::{Global, open};
-use crate::bus::claim::Claim;
-use crate::bus::remote::{SerialAdapter, adapters};
-use crate::output::failure::ErrorMessage;
-use crate::output::interfaces::{BitRateReport, Interface, change, tried_line};
-use crate::output::progress::Activity;
-use crate::tasks::Failure;
-use crate::tasks::detect::{DetectFailure, Evidence, Method, detect};
+use cangauge::bus::claim::Claim;
+use cangauge::bus::remote::{SerialAdapter, adapters};
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::interfaces::{BitRateReport, Interface, change, tried_line};
+use cangauge::output::progress::Activity;
+use cangauge::tasks::Failure;
+use cangauge::tasks::detect::{DetectFailure, Evidence, Method, detect};
 use clap::{Args, Subcommand};
 
 /// List CAN interfaces, bring them up and down, and find the bit rate of a bus

@@ -6,13 +6,13 @@ use super::exit::{FileError, stdout};
 use super::file::ReportFile;
 use super::journal::SettingsJournal;
 use super::{Global, descriptions};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::output::conform::{CaseRow, ConformRecord, ResultRow, SavedReport, left, summary, write_skipped};
-use crate::output::failure::ErrorMessage;
-use crate::output::stdout_width;
-use crate::tasks::conform::{Area, CaseResult, ConformFailure, ConformOptions, Stimulus, cases, conform};
-use crate::tasks::{Failure, Kind, config};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::output::conform::{CaseRow, ConformRecord, ResultRow, SavedReport, left, summary, write_skipped};
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::stdout_width;
+use cangauge::tasks::conform::{Area, CaseResult, ConformFailure, ConformOptions, Stimulus, cases, conform};
+use cangauge::tasks::{Failure, Kind, config};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
@@ -241,7 +241,7 @@ impl Conform {
 /// Keeps the settings in the file of `config apply --rollback`.
 struct Journal<'a> {
     bus: String,
-    console: &'a crate::output::console::Console,
+    console: &'a cangauge::output::console::Console,
     file: Option<SettingsJournal<'a>>,
 }
 

@@ -2,14 +2,14 @@
 
 use super::descriptions::read_file;
 use super::{Global, descriptions, own};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::device::catalog::{self, Model};
-use crate::device::description::read_with_notes;
-use crate::output::devices::{DescriptionText, Finding, Listed};
-use crate::output::draft::toml;
-use crate::output::failure::ErrorMessage;
-use crate::tasks::describe::draft;
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::device::catalog::{self, Model};
+use cangauge::device::description::read_with_notes;
+use cangauge::output::devices::{DescriptionText, Finding, Listed};
+use cangauge::output::draft::toml;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::tasks::describe::draft;
 use clap::{Args, Subcommand};
 use std::sync::Arc;
 

@@ -4,12 +4,12 @@ use super::args::{BusSpec, Nodes};
 use super::exit;
 use super::scan::SCAN_TIMEOUT;
 use super::{Global, descriptions, open};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::output::doctor::FindingReport;
-use crate::output::failure::ErrorMessage;
-use crate::tasks::Kind;
-use crate::tasks::doctor::{DoctorOptions, examine};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::output::doctor::FindingReport;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::tasks::Kind;
+use cangauge::tasks::doctor::{DoctorOptions, examine};
 use clap::Args;
 
 /// Find out why a node or the whole bus is silent

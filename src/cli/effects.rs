@@ -1,7 +1,7 @@
 //! The effects of the commands on the devices and the bus.
 
 use super::Command;
-use crate::master::OnTwoDevices;
+use cangauge::master::OnTwoDevices;
 
 impl Command {
     /// Whether the command only reads objects.

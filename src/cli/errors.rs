@@ -2,9 +2,9 @@
 
 use super::Global;
 use super::nodes::on_node;
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::tasks::settings::errors::{ErrorReport, clear, read};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::tasks::settings::errors::{ErrorReport, clear, read};
 use clap::Args;
 
 /// Show the error register (1001h) and the error history (1003h) of a device, or clear the history

@@ -1,14 +1,14 @@
 //! Exit codes. This is the only place that converts errors to an exit code.
 
 use super::Cli;
-use crate::bus::BusError;
-use crate::master::{Error, SdoError};
-use crate::measure::expression::ExpressionError;
-use crate::output::console::Console;
-use crate::output::failure::ErrorMessage;
-use crate::tasks::failure::Cause;
-use crate::tasks::{Failure, Kind};
 use anstream::ColorChoice;
+use cangauge::bus::BusError;
+use cangauge::master::{Error, SdoError};
+use cangauge::measure::expression::ExpressionError;
+use cangauge::output::console::Console;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::tasks::failure::Cause;
+use cangauge::tasks::{Failure, Kind};
 use clap::CommandFactory;
 use clap::error::{ContextKind, ErrorKind};
 use std::ffi::OsString;
@@ -240,7 +240,7 @@ fn message(error: &anyhow::Error) -> ErrorMessage {
 /// # Errors
 /// stdout was closed when the program started.
 pub(super) fn open_stdout() -> anyhow::Result<io::Stdout> {
-    crate::bus::stdout::stdout().map_err(stdout)
+    cangauge::bus::stdout::stdout().map_err(stdout)
 }
 
 /// Returns the message of an error that means: no bus can be used. `doctor` reports it as a finding. `None` if another

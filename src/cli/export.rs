@@ -3,9 +3,9 @@
 use super::args::Nodes;
 use super::exit::{open_stdout, several, stdout};
 use super::{ErrorMessage, Global, descriptions, open};
-use crate::bus::claim::Claim;
-use crate::output::dbc;
-use crate::tasks::export::messages;
+use cangauge::bus::claim::Claim;
+use cangauge::output::dbc;
+use cangauge::tasks::export::messages;
 use clap::{Args, Subcommand};
 
 /// Export the TPDOs of nodes for other programs (DBC)

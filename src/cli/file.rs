@@ -2,10 +2,10 @@
 //! the bus.
 
 use super::exit::{FileError, open_stdout};
-use crate::bus::file::{Locked, is_same, lock, wait_for_reader};
-use crate::output::failure::ErrorMessage;
-use crate::output::rows::{ExistingLines, OutputTarget, existing_lines};
-use crate::tasks::Kind;
+use cangauge::bus::file::{Locked, is_same, lock, wait_for_reader};
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::rows::{ExistingLines, OutputTarget, existing_lines};
+use cangauge::tasks::Kind;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};

@@ -3,9 +3,9 @@
 use super::Global;
 use super::args::Duration;
 use super::nodes::{on_channels, print_notes};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::tasks::settings::filter::{FilterRequest, FilterType, has_filter, set, show};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::tasks::settings::filter::{FilterRequest, FilterType, has_filter, set, show};
 use clap::{Args, ValueEnum};
 
 /// Show or set the filter of a signal: type (61A0h) and constant (61A1h)

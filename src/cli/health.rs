@@ -4,11 +4,11 @@ use super::args::{BitRate, Duration, Nodes};
 use super::bus::host;
 use super::exit::several;
 use super::{Global, descriptions, open};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::tasks::Failure;
-use crate::tasks::health::{Controller, Health, HealthOptions, figures, health};
-use crate::tasks::nmt::NmtFailure;
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::tasks::Failure;
+use cangauge::tasks::health::{Controller, Health, HealthOptions, figures, health};
+use cangauge::tasks::nmt::NmtFailure;
 use clap::Args;
 
 /// Measure the load of the bus, heartbeat intervals and SDO answer times

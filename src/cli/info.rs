@@ -2,9 +2,9 @@
 
 use super::scan::Scan;
 use super::{Global, descriptions};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::tasks::settings::info::read;
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::tasks::settings::info::read;
 use clap::Args;
 
 /// Show everything about a device on one page

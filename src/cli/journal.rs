@@ -5,13 +5,13 @@
 //! temporary write is locked while its program runs. A file without a lock was left by a killed program.
 
 use super::args::BusSpec;
-use crate::bus::file::lock;
-use crate::canopen::id::NodeId;
-use crate::output::config::write_toml;
-use crate::output::console::Console;
-use crate::tasks::Failure;
-use crate::tasks::config::{self, ConfigFailure, Snapshot};
-use crate::tasks::journal::{Journal, JournalError, TemporaryWrite};
+use cangauge::bus::file::lock;
+use cangauge::canopen::id::NodeId;
+use cangauge::output::config::write_toml;
+use cangauge::output::console::Console;
+use cangauge::tasks::Failure;
+use cangauge::tasks::config::{self, ConfigFailure, Snapshot};
+use cangauge::tasks::journal::{Journal, JournalError, TemporaryWrite};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -226,7 +226,7 @@ fn bytes(hex: &str) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::canopen::object::ObjectId;
+    use cangauge::canopen::object::ObjectId;
 
     fn example() -> TemporaryWrite {
         TemporaryWrite {

@@ -2,10 +2,10 @@
 
 use super::Global;
 use super::nodes::{on_channels, print_notes};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::output::failure::ErrorMessage;
-use crate::tasks::settings::limits::{Limit, has_limits, set, show};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::tasks::settings::limits::{Limit, has_limits, set, show};
 use clap::Args;
 
 /// Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)

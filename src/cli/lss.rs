@@ -4,20 +4,20 @@ mod assign;
 
 use super::args::Duration;
 use super::{Global, descriptions};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::device::catalog::Model;
-use crate::master::Master;
-use crate::node::Overrides;
-use crate::output::failure::ErrorMessage;
-use crate::output::lss::Identified;
-use crate::output::notes;
-use crate::output::progress::Activity;
-use crate::tasks::lss::{
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::device::catalog::Model;
+use cangauge::master::Master;
+use cangauge::node::Overrides;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::lss::Identified;
+use cangauge::output::notes;
+use cangauge::output::progress::Activity;
+use cangauge::tasks::lss::{
     Descriptions, LssCause, LssFailure, LssRange, SearchTimes, Target, TargetError, activate, identify, inquire, scan,
     store,
 };
-use crate::tasks::{Failure, Note};
+use cangauge::tasks::{Failure, Note};
 use clap::{Args, Subcommand};
 use std::str::FromStr;
 use std::sync::Arc;
@@ -203,7 +203,7 @@ impl Activate {
         with_descriptions(global, |master, named, notify| {
             activate(master, target, delay_ms, named, self.force, notify)
         })?;
-        let silent = crate::bus::time::format_duration(2 * self.delay.0);
+        let silent = cangauge::bus::time::format_duration(2 * self.delay.0);
         global.console().note(&format!(
             "sent; devices do not acknowledge this. The new bit rate is active in {silent}: set the host to it"
         ));

@@ -2,9 +2,9 @@
 
 use super::Global;
 use super::nodes::on_node;
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::tasks::settings::minmax::{reset, show};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::tasks::settings::minmax::{reset, show};
 use clap::Args;
 
 /// Show the lowest and highest value that the device has measured, or reset them

@@ -41,20 +41,23 @@ mod sdo;
 mod sim;
 mod store;
 mod tare;
+#[cfg(test)]
+mod tests;
 mod unit;
 
-use crate::bus::claim::{Claim, Claims};
-use crate::bus::interrupt::handle_file_size_limit;
-use crate::canopen::id::NodeId;
-use crate::master::{Master, OnTwoDevices, Timing};
-use crate::output;
-use crate::output::console::Console;
-pub(crate) use crate::output::failure::ErrorMessage;
-use crate::output::notes::undone_text;
-use crate::output::report::{Format, Report, Stream, render};
-use crate::tasks::journal::Journal;
 use anstream::{AutoStream, ColorChoice};
-use args::{BusSpec, Channel, Duration, Load, Override};
+use args::{BusSpec, Channel, Duration, Load, Override, one_of};
+use cangauge::bus::claim::{Claim, Claims};
+use cangauge::bus::interrupt::handle_file_size_limit;
+use cangauge::canopen::id::NodeId;
+use cangauge::master::{Master, OnTwoDevices, Timing};
+use cangauge::output;
+use cangauge::output::console::Console;
+pub(crate) use cangauge::output::failure::ErrorMessage;
+use cangauge::output::notes::undone_text;
+use cangauge::output::report::{Format, Report, Stream, render};
+use cangauge::output::rows::CHOICES;
+use cangauge::tasks::journal::Journal;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use descriptions::Named;
 use exit::{FileError, IntoFailure};
@@ -160,6 +163,7 @@ pub struct Global {
 
     /// Output format (influx: InfluxDB line protocol, for log only). For log, text means csv
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
+    #[arg(value_parser = one_of(CHOICES, Format::name))]
     pub(crate) format: Format,
 
     /// Wait up to DUR if the CAN interface is missing or down

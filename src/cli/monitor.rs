@@ -1,16 +1,15 @@
 //! `cangauge monitor`.
 
-use super::args::{BusSpec, Duration, Nodes};
+use super::args::{BusSpec, Duration, Nodes, one_of};
 use super::exit::stdout;
 use super::{Global, descriptions, open};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::master::{Master, Timing};
-use crate::node::Overrides;
-use crate::output::monitor::{masters, totals};
-use crate::tasks::monitor::{Entry, FrameKind, MonitorOptions, identify, monitor};
-use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::master::{Master, Timing};
+use cangauge::node::Overrides;
+use cangauge::output::monitor::{masters, totals};
+use cangauge::tasks::monitor::{Entry, FrameKind, MonitorOptions, identify, monitor};
+use clap::Args;
 use std::ops::ControlFlow;
 
 /// Show all traffic on the bus in words, until Ctrl-C
@@ -27,6 +26,7 @@ pub(crate) struct Monitor {
     nodes: Nodes,
     /// Show only these kinds of messages [default: all]
     #[arg(short, long, value_name = "KIND", value_delimiter = ',')]
+    #[arg(value_parser = one_of(&FrameKind::ALL, FrameKind::as_str))]
     kind: Vec<FrameKind>,
     /// Also show repetitions: heartbeats without a change of the state, repeated error frames
     #[arg(short, long)]
@@ -37,16 +37,6 @@ pub(crate) struct Monitor {
     /// End after this many messages
     #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
-}
-
-impl ValueEnum for FrameKind {
-    fn value_variants<'a>() -> &'a [FrameKind] {
-        &FrameKind::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.as_str()))
-    }
 }
 
 impl Monitor {

@@ -4,17 +4,19 @@ use super::args::{Duration, Nodes};
 use super::exit::{IntoFailure, several, stdout};
 use super::journal::FileJournal;
 use super::{Global, descriptions, open};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::canopen::nmt::NmtCommand;
-use crate::master::Master;
-use crate::node::Node;
-use crate::node::survey::identify_each;
-use crate::output::failure::ErrorMessage;
-use crate::output::nmt::left_heartbeat;
-use crate::output::notes;
-use crate::tasks::nmt::{NmtFailure, Proof, Starts, StateEvent, StateReport, command, probe, startup, states, watch};
-use crate::tasks::{Fact, Failure, Note};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::nmt::NmtCommand;
+use cangauge::master::Master;
+use cangauge::node::Node;
+use cangauge::node::survey::identify_each;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::nmt::left_heartbeat;
+use cangauge::output::notes;
+use cangauge::tasks::nmt::{
+    NmtFailure, Proof, Starts, StateEvent, StateReport, command, probe, startup, states, watch,
+};
+use cangauge::tasks::{Fact, Failure, Note};
 use clap::{Args, Subcommand, ValueEnum};
 use std::ops::ControlFlow;
 

@@ -4,14 +4,14 @@ use super::Global;
 use super::args::Nodes;
 use super::exit::several;
 use super::{descriptions, open};
-use crate::canopen::id::NodeId;
-use crate::master::Master;
-use crate::measure::layout::Signal;
-use crate::node::{Node, Overrides};
-use crate::output::failure::ErrorMessage;
-use crate::output::notes;
-use crate::tasks::settings::{open as open_node, select_signals};
-use crate::tasks::{Failure, Kind, Note};
+use cangauge::canopen::id::NodeId;
+use cangauge::master::Master;
+use cangauge::measure::layout::Signal;
+use cangauge::node::{Node, Overrides};
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::notes;
+use cangauge::tasks::settings::{open as open_node, select_signals};
+use cangauge::tasks::{Failure, Kind, Note};
 
 /// The results of all nodes.
 pub(super) struct NodeResults<T> {

@@ -2,14 +2,14 @@
 
 use super::exit::IntoFailure;
 use super::{Global, descriptions};
-use crate::bus::claim::Claim;
-use crate::canopen::id::{NodeId, parse_u32};
-use crate::device::catalog::{self, Model};
-use crate::device::dictionary::Entry;
-use crate::node::names::nearest;
-use crate::node::survey::identify;
-use crate::output::failure::ErrorMessage;
-use crate::output::objects::ObjectFacts;
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::{NodeId, parse_u32};
+use cangauge::device::catalog::{self, Model};
+use cangauge::device::dictionary::Entry;
+use cangauge::node::names::nearest;
+use cangauge::node::survey::identify;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::objects::ObjectFacts;
 use clap::Args;
 use std::path::Path;
 use std::sync::Arc;

@@ -4,25 +4,25 @@ use super::Global;
 use super::args::{BusSpec, Channel, Nodes};
 use super::exit::{FileError, IntoFailure};
 use super::file::{lock_output, no_reader};
-use crate::bus::channels::{SdoChannel, SdoChannels};
-use crate::bus::claim::{Claim, ClaimError, Claims, IfHeld, Part};
-use crate::bus::file::wait_for_reader;
-use crate::bus::interrupt::Interrupts;
-use crate::bus::memory::MemoryBus;
-use crate::bus::paced::Paced;
-use crate::bus::remote::Use;
-use crate::bus::replay::{Replay, ReplayNote};
-use crate::bus::time::format_duration;
-use crate::bus::trace::Traced;
-use crate::bus::{Bus, BusError};
-use crate::canopen::id::NodeId;
-use crate::master::{Error, Master};
-use crate::node::targets;
-use crate::output;
-use crate::output::failure::ErrorMessage;
-use crate::sim::{Bench, BenchError};
-use crate::tasks::scan::ScanFailure;
-use crate::tasks::{Failure, Kind};
+use cangauge::bus::channels::{SdoChannel, SdoChannels};
+use cangauge::bus::claim::{Claim, ClaimError, Claims, IfHeld, Part};
+use cangauge::bus::file::wait_for_reader;
+use cangauge::bus::interrupt::Interrupts;
+use cangauge::bus::memory::MemoryBus;
+use cangauge::bus::paced::Paced;
+use cangauge::bus::remote::Use;
+use cangauge::bus::replay::{Replay, ReplayNote};
+use cangauge::bus::time::format_duration;
+use cangauge::bus::trace::Traced;
+use cangauge::bus::{Bus, BusError};
+use cangauge::canopen::id::NodeId;
+use cangauge::master::{Error, Master};
+use cangauge::node::targets;
+use cangauge::output;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::sim::{Bench, BenchError};
+use cangauge::tasks::scan::ScanFailure;
+use cangauge::tasks::{Failure, Kind};
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
@@ -229,7 +229,7 @@ pub(super) fn bench_error(error: BenchError) -> anyhow::Error {
 
 #[cfg(all(target_os = "linux", not(without_socketcan)))]
 fn socketcan(name: &str, even_down: bool) -> Result<Box<dyn Bus>, BusError> {
-    use crate::bus::socketcan::SocketCan;
+    use cangauge::bus::socketcan::SocketCan;
     let open = if even_down { SocketCan::open_even_down } else { SocketCan::open };
     Ok(Box::new(open(name)?))
 }
@@ -242,7 +242,7 @@ fn socketcan(name: &str, _: bool) -> Result<Box<dyn Bus>, BusError> {
 /// The CAN interfaces of this computer, and whether each is up.
 #[cfg(all(target_os = "linux", not(without_socketcan)))]
 pub(super) fn interfaces() -> Vec<(String, bool)> {
-    crate::bus::socketcan::interfaces().into_iter().map(|interface| (interface.name, interface.up)).collect()
+    cangauge::bus::socketcan::interfaces().into_iter().map(|interface| (interface.name, interface.up)).collect()
 }
 
 #[cfg(not(all(target_os = "linux", not(without_socketcan))))]

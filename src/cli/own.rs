@@ -2,9 +2,9 @@
 
 use super::Global;
 use super::file::{as_text, read_input};
-use crate::bus::owner::is_trusted;
-use crate::device::catalog::{self, Model};
-use crate::output::failure::ErrorMessage;
+use cangauge::bus::owner::is_trusted;
+use cangauge::device::catalog::{self, Model};
+use cangauge::output::failure::ErrorMessage;
 use std::env;
 use std::fs::{self, File};
 use std::io;

@@ -4,16 +4,16 @@ use super::args::{Duration, Nodes};
 use super::exit::{several, stdout};
 use super::journal::FileJournal;
 use super::{Global, descriptions, open};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::canopen::pdo::TpdoNumber;
-use crate::output::console::Console;
-use crate::output::events::remark_text;
-use crate::output::failure::ErrorMessage;
-use crate::output::pdo::ReceivedTpdo;
-use crate::output::{diagnosis, notes};
-use crate::tasks::log::Remark;
-use crate::tasks::pdo::{Item, PdoRequest, Trigger, WatchEvent, map, show, watch};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::pdo::TpdoNumber;
+use cangauge::output::console::Console;
+use cangauge::output::events::remark_text;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::pdo::ReceivedTpdo;
+use cangauge::output::{diagnosis, notes};
+use cangauge::tasks::log::Remark;
+use cangauge::tasks::pdo::{Item, PdoRequest, Trigger, WatchEvent, map, show, watch};
 use clap::{Args, Subcommand};
 use std::ops::ControlFlow;
 
@@ -133,7 +133,7 @@ fn inhibit(text: &str) -> Result<u16, String> {
 }
 
 fn identifier(text: &str) -> Result<u16, String> {
-    let number = crate::canopen::id::parse_u32(text);
+    let number = cangauge::canopen::id::parse_u32(text);
     number.and_then(|number| u16::try_from(number).ok()).filter(|&number| number <= 0x7ff).ok_or_else(|| {
         format!("\"{text}\" is not an 11-bit identifier (0x181 to 0x57F, without the flags of the COB-ID)")
     })

@@ -3,15 +3,15 @@
 use super::args::{Nodes, SignalArg};
 use super::exit::{IntoFailure, several};
 use super::{Global, descriptions, open};
-use crate::bus::claim::Claim;
-use crate::device::unit::Unit;
-use crate::measure::decode::Wanted;
-use crate::measure::sample::{Doubt, Sample, Source};
-use crate::output::doubt;
-use crate::output::failure::ErrorMessage;
-use crate::output::read::ReadValue;
-use crate::tasks::read::{ReadFailure, Readings, Target, read};
-use crate::tasks::{Failure, Kind};
+use cangauge::bus::claim::Claim;
+use cangauge::device::unit::Unit;
+use cangauge::measure::decode::Wanted;
+use cangauge::measure::sample::{Doubt, Sample, Source};
+use cangauge::output::doubt;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::read::ReadValue;
+use cangauge::tasks::read::{ReadFailure, Readings, Target, read};
+use cangauge::tasks::{Failure, Kind};
 use clap::Args;
 
 /// Read measured values now, scaled, with unit and status

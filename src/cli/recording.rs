@@ -2,11 +2,11 @@
 
 use super::Global;
 use super::args::{BusSpec, Duration};
-use crate::measure::expression::verdict::{Outcome, Verdict};
-use crate::output::console::Console;
-use crate::output::events::{EventText, Severity};
-use crate::output::failure::ErrorMessage;
-use crate::output::verdict;
+use cangauge::measure::expression::verdict::{Outcome, Verdict};
+use cangauge::output::console::Console;
+use cangauge::output::events::{EventText, Severity};
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::verdict;
 
 /// The shortest interval of SYNC, polling and remote requests.
 const SHORTEST_INTERVAL: std::time::Duration = std::time::Duration::from_millis(1);

@@ -3,12 +3,12 @@
 use super::args::Nodes;
 use super::exit::{IntoFailure, several};
 use super::{Global, descriptions};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::canopen::nmt::NmtState;
-use crate::output::progress::Activity;
-use crate::tasks::Failure;
-use crate::tasks::scan::{Found, ScanFailure, listen, scan};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::nmt::NmtState;
+use cangauge::output::progress::Activity;
+use cangauge::tasks::Failure;
+use cangauge::tasks::scan::{Found, ScanFailure, listen, scan};
 use clap::Args;
 use std::time::Duration;
 

@@ -3,13 +3,13 @@
 use super::args::BusSpec;
 use super::exit::{FileError, IntoFailure};
 use super::{Global, open};
-use crate::bus::Bus;
-use crate::bus::claim::Claim;
-use crate::bus::interrupt::lines_with_interrupts;
-use crate::bus::memory::Station;
-use crate::bus::server::{Address, Server};
-use crate::output::failure::ErrorMessage;
-use crate::sim;
+use cangauge::bus::Bus;
+use cangauge::bus::claim::Claim;
+use cangauge::bus::interrupt::lines_with_interrupts;
+use cangauge::bus::memory::Station;
+use cangauge::bus::server::{Address, Server};
+use cangauge::output::failure::ErrorMessage;
+use cangauge::sim;
 use clap::Args;
 use std::path::PathBuf;
 

@@ -3,12 +3,12 @@
 use super::Global;
 use super::args::Nodes;
 use super::nodes::{NodeResults, on_each_node};
-use crate::bus::claim::Claim;
-use crate::output::notes;
-use crate::output::report::Report;
-use crate::output::store::{Restored, Stored};
-use crate::tasks::store::{Group, StoreReport};
-use crate::tasks::{restore, store};
+use cangauge::bus::claim::Claim;
+use cangauge::output::notes;
+use cangauge::output::report::Report;
+use cangauge::output::store::{Restored, Stored};
+use cangauge::tasks::store::{Group, StoreReport};
+use cangauge::tasks::{restore, store};
 use clap::{Args, ValueEnum};
 
 /// Save settings to non-volatile memory (1010h)

@@ -3,8 +3,8 @@
 use super::Global;
 use super::args::Nodes;
 use super::autozero::run_each;
-use crate::bus::claim::Claim;
-use crate::tasks::autozero::{Limit, Options, ZeroTarget, autozero, undo_tare};
+use cangauge::bus::claim::Claim;
+use cangauge::tasks::autozero::{Limit, Options, ZeroTarget, autozero, undo_tare};
 use clap::Args;
 
 /// Set the net value of a channel to zero (6139h), or restore it (--undo)

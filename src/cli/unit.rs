@@ -3,13 +3,13 @@
 use super::Global;
 use super::nodes::{on_channels, print_notes};
 use super::read::parse_unit;
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
-use crate::device::unit::Unit as Code;
-use crate::measure::layout::Signal;
-use crate::node::Node;
-use crate::output::failure::ErrorMessage;
-use crate::tasks::settings::unit::{is_alike, set, show};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::device::unit::Unit as Code;
+use cangauge::measure::layout::Signal;
+use cangauge::node::Node;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::tasks::settings::unit::{is_alike, set, show};
 use clap::Args;
 
 /// Show or set the physical unit of a signal (6131h)

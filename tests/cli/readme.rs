@@ -1,10 +1,7 @@
 //! The README: its terminal picture shows real output, and its commands work as printed.
 
-use super::examples::words;
+use super::examples::{readme, words};
 use super::{ALL, Bench};
-use cangauge::cli::Cli;
-use clap::Parser;
-use clap::error::ErrorKind;
 use std::fs;
 use std::io::ErrorKind as IoError;
 use std::io::Write as _;
@@ -27,15 +24,10 @@ fn path() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")
 }
 
-fn text() -> String {
-    fs::read_to_string(path()).expect("the README")
-}
-
 /// The fenced blocks of a language.
 fn blocks(language: &str) -> Vec<String> {
     let start = format!("```{language}\n");
-    let text = text();
-    text.split(&start).skip(1).filter_map(|rest| rest.split("```").next()).map(str::to_owned).collect()
+    readme().split(&start).skip(1).filter_map(|rest| rest.split("```").next()).map(str::to_owned).collect()
 }
 
 /// Runs the commands on the devices of `-b sim`, with the virtual clock: the output is always the same.
@@ -52,7 +44,7 @@ fn picture() -> String {
 
 #[test]
 fn the_terminal_picture_is_up_to_date() {
-    let readme = text();
+    let readme = readme();
     let (before, rest) = readme.split_once(START).expect("the start of the picture");
     let (_, after) = rest.split_once(END).expect("the end of the picture");
     let wanted = format!("{before}{START}{}{END}{after}", picture());
@@ -102,7 +94,7 @@ fn installed_files_exist() {
 /// Every device is named, and the rows of the table have the defaults of the descriptions.
 #[test]
 fn every_built_in_device_is_listed() {
-    let text = text();
+    let text = readme();
     for model in cangauge::device::catalog::built_in() {
         let (name, factory) = (&model.description.name, &model.description.factory);
         assert!(text.contains(&format!("`{name}`")) || text.contains(&format!("`--device {name}`")), "{name}");
@@ -131,18 +123,4 @@ fn the_python_example_works() {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     assert_eq!(stdout.lines().count(), 3, "{stdout}");
     assert!(stdout.starts_with("1 pressure 1.") && stdout.contains(" psi None\n"), "{stdout}");
-}
-
-#[test]
-fn commands_in_the_text_are_valid() {
-    let text = text();
-    let commands = text.split('`').skip(1).step_by(2).filter(|code| code.starts_with("cangauge "));
-    let commands: Vec<&str> = commands.filter(|code| !code.contains("COMMAND")).collect();
-    assert!(commands.len() > 3, "{commands:?}");
-    for command in commands {
-        match Cli::try_parse_from(words(command)) {
-            Err(error) if error.kind() != ErrorKind::DisplayHelp => panic!("{command}: {error}"),
-            _ => {}
-        }
-    }
 }

@@ -1,7 +1,7 @@
 //! Lists and sets the interfaces of this computer for `cangauge bus`.
 
-use crate::output::interfaces::Interface;
-use crate::tasks::Failure;
+use cangauge::output::interfaces::Interface;
+use cangauge::tasks::Failure;
 
 /// An interface before and after it was set.
 pub(super) struct Changed {
@@ -12,13 +12,13 @@ pub(super) struct Changed {
 #[cfg(all(target_os = "linux", not(without_socketcan)))]
 mod linux {
     use super::{Changed, Failure, Interface};
-    use crate::bus::Mode;
-    use crate::bus::socketcan::{Change, Link, State, bring_down, bring_up, interfaces, link};
-    use crate::tasks::host::{HostAction, HostFailure, not_set};
+    use cangauge::bus::Mode;
+    use cangauge::bus::socketcan::{Change, Link, State, bring_down, bring_up, interfaces, link};
+    use cangauge::tasks::host::{HostAction, HostFailure, not_set};
 
     /// The interfaces of this computer.
     pub(in crate::cli) fn list() -> Vec<Interface> {
-        let described = |found: crate::bus::socketcan::Interface| {
+        let described = |found: cangauge::bus::socketcan::Interface| {
             // The interface may have been removed in the meantime.
             let link = link(&found.name).ok();
             let up = link.as_ref().map_or(found.up, |link| link.up);
@@ -94,7 +94,7 @@ pub(super) fn down(name: &str) -> Result<Changed, Failure> {
 
 #[cfg(not(all(target_os = "linux", not(without_socketcan))))]
 fn unsupported(name: &str) -> Failure {
-    use crate::tasks::host::{HostAction, not_set};
-    let error = crate::bus::BusError::Unsupported(format!("{name}: this system has no SocketCAN"));
+    use cangauge::tasks::host::{HostAction, not_set};
+    let error = cangauge::bus::BusError::Unsupported(format!("{name}: this system has no SocketCAN"));
     not_set(error, HostAction::Down { interface: name.to_owned() })
 }

@@ -4,29 +4,29 @@ mod prompt;
 
 use super::table::Table;
 use super::{Failures, described, file, mistakes, nodes_and_file, parse};
-use crate::bus::Wall;
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
 use crate::cli::args::Nodes;
 use crate::cli::exit::{IntoFailure, several_each};
 use crate::cli::file::ReportFile;
 use crate::cli::journal::SettingsJournal;
 use crate::cli::{Global, descriptions, open};
-use crate::device::config_file::Document;
-use crate::master::Master;
-use crate::node::survey::identify_each;
-use crate::node::{Node, Overrides};
-use crate::output::config::{AppliedReport, LineReport};
-use crate::output::config_record::ConfigRecord;
-use crate::output::console::Console;
-use crate::output::failure::ErrorMessage;
-use crate::output::notes;
-use crate::tasks::config::diff::check_offline;
-use crate::tasks::config::{
+use cangauge::bus::Wall;
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::device::config_file::Document;
+use cangauge::master::Master;
+use cangauge::node::survey::identify_each;
+use cangauge::node::{Node, Overrides};
+use cangauge::output::config::{AppliedReport, LineReport};
+use cangauge::output::config_record::ConfigRecord;
+use cangauge::output::console::Console;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::notes;
+use cangauge::tasks::config::diff::check_offline;
+use cangauge::tasks::config::{
     ApplyReport, ConfigFailure, File, FileSettings, Line, Options, Sections, Snapshot, apply, check_device, lines,
     read, resume,
 };
-use crate::tasks::{Failure, Kind, Note};
+use cangauge::tasks::{Failure, Kind, Note};
 use clap::Args;
 use std::path::{Path, PathBuf};
 

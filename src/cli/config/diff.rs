@@ -1,17 +1,17 @@
 //! `cangauge config diff`.
 
 use super::{described, document, file, mistakes};
-use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
 use crate::cli::{Global, descriptions};
-use crate::master::Master;
-use crate::node::Overrides;
-use crate::output::config::ChangedSetting;
-use crate::output::failure::ErrorMessage;
-use crate::output::notes;
-use crate::tasks::Kind;
-use crate::tasks::config::diff::{Difference, check_offline, of_devices, of_files, with_file};
-use crate::tasks::config::{File, Sections, read};
+use cangauge::bus::claim::Claim;
+use cangauge::canopen::id::NodeId;
+use cangauge::master::Master;
+use cangauge::node::Overrides;
+use cangauge::output::config::ChangedSetting;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::notes;
+use cangauge::tasks::Kind;
+use cangauge::tasks::config::diff::{Difference, check_offline, of_devices, of_files, with_file};
+use cangauge::tasks::config::{File, Sections, read};
 use clap::Args;
 
 /// Compare a device with a file, two devices, or two files; exit 1 if anything differs

@@ -2,13 +2,13 @@
 //! in the settings file.
 
 use super::{document, mistakes};
-use crate::canopen::id::{NodeId, parse_u32};
 use crate::cli::exit::FileError;
 use crate::cli::file::ReportFile;
-use crate::device::catalog;
-use crate::device::config_file::{Document, Entry, Item, Place};
-use crate::output::failure::ErrorMessage;
-use crate::tasks::config::{Mistake, Problem};
+use cangauge::canopen::id::{NodeId, parse_u32};
+use cangauge::device::catalog;
+use cangauge::device::config_file::{Document, Entry, Item, Place};
+use cangauge::output::failure::ErrorMessage;
+use cangauge::tasks::config::{Mistake, Problem};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};

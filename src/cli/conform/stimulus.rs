@@ -1,7 +1,7 @@
 //! The command of `--stimulus`, which sets the input of the device.
 
-use crate::bus::program::{ProgramError, ShellCommand};
-use crate::tasks::conform::{Input, Stimulus, StimulusFailure};
+use cangauge::bus::program::{ProgramError, ShellCommand};
+use cangauge::tasks::conform::{Input, Stimulus, StimulusFailure};
 use std::io;
 use std::time::Duration;
 

@@ -4,16 +4,16 @@ use super::super::args::{BusSpec, Tag, tag_pairs};
 use super::super::exit::{FileError, open_stdout};
 use super::super::file::{Existing, OutFile, ReportFile, lock_output};
 use super::run_file::{RunFile, new_run, run_file_name};
-use crate::bus::Wall;
-use crate::output::events::Events;
-use crate::output::failure::ErrorMessage;
-use crate::output::rows::{
+use cangauge::bus::Wall;
+use cangauge::output::events::Events;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::rows::{
     Dialect, ExistingLines, FileFormat, HeaderMismatch, Layout, LineWriter, OutputTarget, QUEUE_CAPACITY, Rotation,
     Rows, Series, Setup, TimeForm, existing_lines,
 };
-use crate::publish::series;
-use crate::tasks::Failure;
-use crate::tasks::log::LogFailure;
+use cangauge::publish::series;
+use cangauge::tasks::Failure;
+use cangauge::tasks::log::LogFailure;
 use clap::{Args, ValueEnum};
 use std::fs::{File, OpenOptions};
 use std::io;

@@ -4,14 +4,14 @@ use super::super::exit::{Several, open_stdout, stdout};
 use super::super::file::OutFile;
 use super::files::OpenFiles;
 use super::recorder::{Recorder, Unwritten};
-use crate::bus::interrupt::Interrupts;
-use crate::measure::expression::verdict::Verdict;
-use crate::output::console::Console;
-use crate::output::events::Events;
-use crate::output::summary::{Summary, Written, write_json};
-use crate::tasks::check::all_satisfied;
-use crate::tasks::log::{LogFailure, RecordingReport};
-use crate::tasks::{Failure, Kind};
+use cangauge::bus::interrupt::Interrupts;
+use cangauge::measure::expression::verdict::Verdict;
+use cangauge::output::console::Console;
+use cangauge::output::events::Events;
+use cangauge::output::summary::{Summary, Written, write_json};
+use cangauge::tasks::check::all_satisfied;
+use cangauge::tasks::log::{LogFailure, RecordingReport};
+use cangauge::tasks::{Failure, Kind};
 use std::io::{self, Write};
 
 /// The longest wait for a blocked output after Ctrl-C, in tenths of a second.

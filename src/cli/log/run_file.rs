@@ -2,10 +2,10 @@
 
 use super::super::args::BusSpec;
 use super::super::file::ReportFile;
-use crate::bus::Wall;
-use crate::bus::host::{host_name, new_run_id};
-use crate::node::Node;
-use crate::output::run_file::{RunNode, RunRecord};
+use cangauge::bus::Wall;
+use cangauge::bus::host::{host_name, new_run_id};
+use cangauge::node::Node;
+use cangauge::output::run_file::{RunNode, RunRecord};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 

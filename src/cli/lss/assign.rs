@@ -1,15 +1,15 @@
 //! `cangauge lss set-id`, `set-bitrate` and `set`.
 
 use super::{NamedDescriptions, print_note};
-use crate::canopen::id::NodeId;
 use crate::cli::Global;
 use crate::cli::args::{BitRate, BusSpec, Nodes};
 use crate::cli::exit::several;
-use crate::output::failure::ErrorMessage;
-use crate::output::lss::AssignReport;
-use crate::output::notes;
-use crate::output::report::Stream;
-use crate::tasks::lss::{Job, RequestedRate, Target, Via, assign, check_rate, check_store};
+use cangauge::canopen::id::NodeId;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::output::lss::AssignReport;
+use cangauge::output::notes;
+use cangauge::output::report::Stream;
+use cangauge::tasks::lss::{Job, RequestedRate, Target, Via, assign, check_rate, check_store};
 use clap::{Args, ValueEnum};
 use std::str::FromStr;
 

@@ -1,12 +1,16 @@
 //! The words of a command line, one for each line. Printed values parse to the same value.
 #![no_main]
 
+#[allow(dead_code, reason = "the target runs no command")]
+#[path = "../../../src/cli/mod.rs"]
+mod cli;
+
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::lss::{LssAddress, LssRange};
 use cangauge::canopen::object::ObjectId;
-use cangauge::cli::args::{BitRate, BusSpec, Duration, InterfaceName, Nodes, ObjectArg, Override, SignalArg};
-use cangauge::cli::parse::parse;
 use cangauge::tasks::lss::Target;
+use cli::args::{BitRate, BusSpec, Duration, InterfaceName, Nodes, ObjectArg, Override, SignalArg};
+use cli::parse::parse;
 use libfuzzer_sys::fuzz_target;
 use std::ffi::OsString;
 
