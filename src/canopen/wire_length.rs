@@ -13,31 +13,37 @@ pub const INTERMISSION: u32 = 3;
 
 /// Returns the length of `frame` in bits, with stuff bits, without the intermission.
 pub fn frame_bits(frame: &Frame) -> u32 {
-    let mut wire = Wire::new();
-    wire.put(0, 1);
+    let mut bits = header_and_data(frame);
+    bits.push(u32::from(bits.crc()), 15);
+    bits.length + bits.stuff_bits() + TAIL_BITS
+}
+
+/// Returns the bits that the CRC covers: from the start of frame to the data.
+fn header_and_data(frame: &Frame) -> Bits {
+    let mut bits = Bits { value: 0, length: 0 };
+    bits.push(0, 1);
     match frame.id() {
         CanId::Standard(id) => {
-            wire.put(u32::from(id), 11);
-            wire.put(u32::from(frame.is_remote()), 1);
+            bits.push(u32::from(id), 11);
+            bits.push(u32::from(frame.is_remote()), 1);
             // IDE and r0, both dominant.
-            wire.put(0, 2);
+            bits.push(0, 2);
         }
         CanId::Extended(id) => {
-            wire.put(id >> 18, 11);
+            bits.push(id >> 18, 11);
             // SRR and IDE, both recessive.
-            wire.put(0b11, 2);
-            wire.put(id & 0x3_ffff, 18);
-            wire.put(u32::from(frame.is_remote()), 1);
+            bits.push(0b11, 2);
+            bits.push(id & 0x3_ffff, 18);
+            bits.push(u32::from(frame.is_remote()), 1);
             // r1 and r0, both dominant.
-            wire.put(0, 2);
+            bits.push(0, 2);
         }
     }
-    wire.put(u32::from(frame.len()), 4);
+    bits.push(u32::from(frame.len()), 4);
     for &byte in frame.data() {
-        wire.put(u32::from(byte), 8);
+        bits.push(u32::from(byte), 8);
     }
-    wire.put_crc();
-    wire.bits + TAIL_BITS
+    bits
 }
 
 /// Returns the time that `frame` and its intermission take at `bit_rate` bit/s.
@@ -61,58 +67,63 @@ pub fn priority(frame: &Frame) -> u32 {
     }
 }
 
-/// Counts the bits and stuff bits of a frame, and computes its CRC.
-struct Wire {
-    bits: u32,
-    crc: u16,
-    last: bool,
-    /// The number of equal bits at the end so far; 0 before the first bit.
-    run: u8,
+/// The bits of a frame before stuffing, the first bit highest. The longest frame has 118 bits up to its CRC.
+struct Bits {
+    value: u128,
+    length: u32,
 }
 
-impl Wire {
-    fn new() -> Wire {
-        Wire { bits: 0, crc: 0, last: false, run: 0 }
+impl Bits {
+    /// Adds the lowest `width` bits of `value`, highest bit first. The other bits of `value` are 0.
+    fn push(&mut self, value: u32, width: u32) {
+        self.value = self.value << width | u128::from(value);
+        self.length += width;
     }
 
-    /// Adds the lowest `width` bits of `value`, highest bit first.
-    fn put(&mut self, value: u32, width: u32) {
-        // A reversed range would be slow in a build without optimization.
-        let mut position = width;
-        while position > 0 {
-            position -= 1;
-            let bit = value >> position & 1 == 1;
-            // CRC-15 of CAN: x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1.
-            let invert = bit ^ (self.crc & 0x4000 != 0);
-            self.crc = self.crc << 1 & 0x7fff;
-            if invert {
-                self.crc ^= 0x4599;
-            }
-            self.stuff(bit);
+    /// Returns the CRC-15. Zeros before the first bit do not change it.
+    fn crc(&self) -> u16 {
+        let mut crc = 0;
+        for byte in self.value.to_be_bytes() {
+            crc = crc << 8 & 0x7fff ^ CRC_TABLE[usize::from(crc >> 7) ^ usize::from(byte)];
         }
+        crc
     }
 
-    fn put_crc(&mut self) {
-        let crc = self.crc;
-        let mut position = 15;
-        while position > 0 {
-            position -= 1;
-            self.stuff(crc >> position & 1 == 1);
+    /// Counts the stuff bits: one of the opposite value after five equal bits. The stuff bit is the first bit of the
+    /// next run.
+    fn stuff_bits(&self) -> u32 {
+        let mut rest = self.value << (u128::BITS - self.length);
+        let (mut left, mut count, mut stuffed) = (self.length, 0, 0);
+        while left > 0 {
+            let run = rest.leading_zeros().max(rest.leading_ones()).min(left);
+            left -= run;
+            rest = rest.checked_shl(run).unwrap_or_default();
+            count += (stuffed + run) / 5;
+            stuffed = u32::from((stuffed + run) % 5 == 0);
         }
-    }
-
-    /// Adds one bit, and a stuff bit of the opposite value after five equal bits. The stuff bit starts a new run.
-    fn stuff(&mut self, bit: bool) {
-        self.bits += 1;
-        self.run = if self.last == bit { self.run + 1 } else { 1 };
-        self.last = bit;
-        if self.run == 5 {
-            self.bits += 1;
-            self.last = !bit;
-            self.run = 1;
-        }
+        count
     }
 }
+
+/// CRC-15 of CAN: x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1, without x^15.
+const CRC_POLYNOMIAL: u16 = 0x4599;
+
+/// The CRC of each byte.
+const CRC_TABLE: [u16; 256] = {
+    let mut table = [0; 256];
+    let mut byte = 0u16;
+    while byte < 256 {
+        let mut crc = byte << 7;
+        let mut bit = 0;
+        while bit < 8 {
+            crc = if crc & 0x4000 == 0 { crc << 1 } else { crc << 1 & 0x7fff ^ CRC_POLYNOMIAL };
+            bit += 1;
+        }
+        table[byte as usize] = crc;
+        byte += 1;
+    }
+    table
+};
 
 #[cfg(test)]
 mod tests {
@@ -124,16 +135,7 @@ mod tests {
     }
 
     fn crc(text: &str) -> u16 {
-        let frame = frame(text);
-        let mut wire = Wire::new();
-        let CanId::Standard(id) = frame.id() else { panic!("11 bits") };
-        wire.put(0, 1);
-        wire.put(u32::from(id), 11);
-        wire.put(u32::from(frame.is_remote()), 1);
-        wire.put(0, 2);
-        wire.put(u32::from(frame.len()), 4);
-        frame.data().iter().for_each(|&byte| wire.put(u32::from(byte), 8));
-        wire.crc
+        header_and_data(&frame(text)).crc()
     }
 
     /// Computes the CRC by polynomial division of a list of bits, as a reference for the shift register.
@@ -224,23 +226,52 @@ mod tests {
         }
     }
 
-    proptest! {
-            #[test]
-    fn lengths_stay_within_the_limits_of_the_standard(
-                id in 0u32..0x2000_0000, extended: bool, remote: bool,
-                data in proptest::collection::vec(any::<u8>(), 0..=8),
-            ) {
-                let id = if extended {
-                    CanId::Extended(id)
-                } else {
-                    CanId::Standard(u16::try_from(id & 0x7ff).expect("11 bits"))
-                };
-                let len = u8::try_from(data.len()).expect("at most 8");
-                let frame = if remote { Frame::remote(id, len) } else { Frame::new(id, &data) }.expect("at most 8");
-                let stuffable = if extended { 54 } else { 34 } + if remote { 0 } else { 8 * u32::from(len) };
-                let bits = frame_bits(&frame);
-                prop_assert!(bits >= stuffable + TAIL_BITS);
-                prop_assert!(bits <= stuffable + TAIL_BITS + (stuffable - 1) / 4);
+    /// Counts the bits of a frame and its stuff bits one by one.
+    fn counted_bits(frame: &Frame) -> u32 {
+        let bits = header_and_data(frame);
+        let mut wire: Vec<u8> = (0..bits.length).rev().map(|at| u8::from(bits.value >> at & 1 == 1)).collect();
+        let crc = remainder(&wire);
+        wire.extend((0..15).rev().map(|at| u8::from(crc >> at & 1 == 1)));
+        let mut sent: Vec<u8> = Vec::new();
+        let mut run = 0;
+        for bit in wire {
+            run = if sent.last() == Some(&bit) { run + 1 } else { 1 };
+            sent.push(bit);
+            if run == 5 {
+                sent.push(1 - bit);
+                run = 1;
             }
         }
+        u32::try_from(sent.len()).expect("a small number") + TAIL_BITS
+    }
+
+    fn any_frame() -> impl Strategy<Value = Frame> {
+        // Bytes of equal bits cause most stuff bits.
+        let byte = prop_oneof![Just(0x00), Just(0xff), any::<u8>()];
+        let data = proptest::collection::vec(byte, 0..=8);
+        (0u32..0x2000_0000, any::<bool>(), any::<bool>(), data).prop_map(|(id, extended, remote, data)| {
+            let id = if extended {
+                CanId::Extended(id)
+            } else {
+                CanId::Standard(u16::try_from(id & 0x7ff).expect("11 bits"))
+            };
+            let len = u8::try_from(data.len()).expect("at most 8");
+            if remote { Frame::remote(id, len) } else { Frame::new(id, &data) }.expect("at most 8")
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn lengths_stay_within_the_limits_of_the_standard(frame in any_frame()) {
+            let stuffable = header_and_data(&frame).length + 15;
+            let bits = frame_bits(&frame);
+            prop_assert!(bits >= stuffable + TAIL_BITS);
+            prop_assert!(bits <= stuffable + TAIL_BITS + (stuffable - 1) / 4);
+        }
+
+        #[test]
+        fn length_is_that_of_a_count_bit_by_bit(frame in any_frame()) {
+            prop_assert_eq!(frame_bits(&frame), counted_bits(&frame));
+        }
+    }
 }
