@@ -44,7 +44,7 @@ impl ObjectId {
         let index = text.split([':', '.']).next().unwrap_or(text);
         let is_long = index.len() >= 4 || index.starts_with("0x") || index.starts_with("0X");
         let has_first_digit = text.starts_with(|first: char| first.is_ascii_digit());
-        text.parse::<ObjectId>().is_ok() || has_first_digit && is_long && text.chars().all(is_part)
+        text.chars().all(is_part) && (has_first_digit && is_long || text.parse::<ObjectId>().is_ok())
     }
 
     /// The object at the same index and another sub-index.

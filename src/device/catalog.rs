@@ -1,12 +1,14 @@
 //! The built-in device descriptions, and the recognition of a device by its answers.
 
+mod recognition;
+
 use super::config_file::Place;
-use super::description::{self, Description, DescriptionError};
+use super::description::{self, Description, DescriptionError, Identify};
 use super::dictionary::Dictionary;
-use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::device::eds::Eds;
 use crate::device::profiles;
+pub use recognition::{by_identity, objects_to_read, recognise};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
@@ -146,31 +148,6 @@ impl Model {
         merged
     }
 
-    /// Whether 1000h, 1018h and 1008h agree with the description. `is_confirmed` checks the other objects.
-    fn has_identity(&self, traits: &IdentityAnswers) -> bool {
-        fn agrees<T: PartialEq>(wanted: &Option<T>, found: &Option<T>) -> bool {
-            wanted.is_none() || wanted == found
-        }
-        let wanted = &self.description.identify;
-        !wanted.is_empty()
-            && agrees(&wanted.device_type, &traits.device_type)
-            && agrees(&wanted.vendor_id, &traits.vendor_id)
-            && agrees(&wanted.product_code, &traits.product_code)
-            && agrees(&wanted.device_name, &traits.device_name)
-    }
-
-    /// Whether the objects that confirm the identity have the required values. Bytes after the width of the type are
-    /// ignored, because a server that omits the size sends four bytes.
-    fn is_confirmed(&self, traits: &IdentityAnswers) -> bool {
-        self.description.identify.confirm.iter().all(|(&object, value)| {
-            let wanted = self.dictionary.get(object).and_then(|entry| value.encode(entry.data_type, NodeId::MIN).ok());
-            match (wanted, traits.answers.get(&object)) {
-                (Some(wanted), Some(found)) => found.starts_with(&wanted),
-                _ => false,
-            }
-        })
-    }
-
     /// Whether both descriptions recognise the same devices.
     pub fn is_for_the_same_device(&self, other: &Model) -> bool {
         let key = |model: &Model| {
@@ -178,13 +155,6 @@ impl Model {
             (identify.device_type, identify.vendor_id, identify.product_code, identify.device_name, identify.confirm)
         };
         !self.description.identify.is_empty() && key(self) == key(other)
-    }
-
-    /// How specific the description is: the number of its identity keys, then the number of other objects to compare. A
-    /// more specific description has priority.
-    fn rank(&self) -> (usize, usize) {
-        let identify = &self.description.identify;
-        (identify.identity_count(), identify.confirm.len())
     }
 }
 
@@ -221,6 +191,12 @@ fn file(index: usize) -> Option<Arc<Model>> {
     MODELS.get(index)?.get_or_init(|| Model::from_toml(text).ok().map(Arc::new)).clone()
 }
 
+/// Returns the identity in a built-in description.
+fn identify(index: usize) -> &'static Identify {
+    static IDENTITIES: [OnceLock<Identify>; FILES.len()] = [const { OnceLock::new() }; FILES.len()];
+    IDENTITIES[index].get_or_init(|| description::read_identify(FILES[index].1).unwrap_or_default())
+}
+
 /// The names of the built-in descriptions, in ascending order.
 pub fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
@@ -239,58 +215,15 @@ pub fn by_name(name: &str) -> Option<Arc<Model>> {
     file(names().position(|other| other == name)?)
 }
 
-/// Returns the description with this vendor-ID and product code, if there is exactly one. It is used if nothing else
-/// about the device is known.
-pub fn by_identity(vendor: u32, product: u32) -> Option<Arc<Model>> {
-    let wanted = (Some(vendor), Some(product));
-    let mut fitting = all().filter(|model| {
-        let identify = &model.description.identify;
-        (identify.vendor_id, identify.product_code) == wanted
-    });
-    fitting.next().filter(|_| fitting.next().is_none()).cloned()
-}
-
 /// Whether a built-in description is for a device of this vendor (1018h:1).
 pub fn has_vendor(vendor: u32) -> bool {
-    built_in().iter().any(|model| model.description.identify.vendor_id == Some(vendor))
-}
-
-/// Returns the objects to read before [`recognise`] can decide. Empty if no object is needed, or if no description can
-/// fit. The caller reads them, and adds the received bytes to [`IdentityAnswers::answers`].
-pub fn objects_to_read(traits: &IdentityAnswers) -> Vec<ObjectId> {
-    // Other descriptions with the same number of identity keys cannot change the decision. Only a description with more
-    // identity keys would have priority.
-    let decided_keys = recognise(traits).map_or(0, |model| model.rank().0);
-    let is_undecided = |model: &&Arc<Model>| model.has_identity(traits) && model.rank().0 > decided_keys;
-    let mut objects: Vec<ObjectId> = all()
-        .filter(is_undecided)
-        .flat_map(|model| model.description.identify.confirm.keys().copied())
-        .filter(|object| !traits.answers.contains_key(object))
-        .collect();
-    objects.sort_unstable();
-    objects.dedup();
-    objects
-}
-
-/// Returns the description that fits the answers of a device: a description of the user, else a built-in one. If
-/// several fit, the most specific one is used. If two are equally specific, none is used.
-pub fn recognise(traits: &IdentityAnswers) -> Option<Arc<Model>> {
-    let fits = |model: &&Arc<Model>| model.has_identity(traits) && model.is_confirmed(traits);
-    let best = |mut fitting: Vec<&Arc<Model>>| {
-        fitting.sort_by_key(|model| std::cmp::Reverse(model.rank()));
-        match fitting[..] {
-            [first, second, ..] if first.rank() == second.rank() => None,
-            [first, ..] => Some(Arc::clone(first)),
-            [] => None,
-        }
-    };
-    let of_user: Vec<&Arc<Model>> = own().iter().filter(fits).collect();
-    if of_user.is_empty() { best(all().filter(fits).collect()) } else { best(of_user) }
+    (0..FILES.len()).any(|index| identify(index).vendor_id == Some(vendor))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::canopen::id::NodeId;
     use crate::canopen::value::DataType;
     use crate::device::scalar::Scalar;
 
@@ -339,6 +272,9 @@ mod tests {
             assert_eq!(description.name, *name, "the file has the name of the device");
         }
         assert_eq!(built_in().len(), FILES.len());
+        for (index, model) in built_in().iter().enumerate() {
+            assert_eq!(*identify(index), model.description.identify, "{}", model.description.name);
+        }
         assert!(names().eq(built_in().iter().map(|model| model.description.name.as_str())));
     }
 
@@ -366,7 +302,7 @@ mod tests {
                 answers: BTreeMap::new(),
             };
             // A description without an identity is used only if the user names it.
-            assert_eq!(model.has_identity(&own), !wanted.is_empty(), "{}", model.description.name);
+            assert_eq!(wanted.agrees_with(&own), !wanted.is_empty(), "{}", model.description.name);
             let other = |number: Option<u32>| number.map(|number| number ^ 1);
             let others = [
                 IdentityAnswers { device_type: other(own.device_type), ..own.clone() },
@@ -374,7 +310,7 @@ mod tests {
                 IdentityAnswers { product_code: other(own.product_code), ..own.clone() },
                 IdentityAnswers { device_name: own.device_name.clone().map(|name| name + "!"), ..own.clone() },
             ];
-            let wrong: Vec<_> = others.iter().filter(|other| **other != own && model.has_identity(other)).collect();
+            let wrong: Vec<_> = others.iter().filter(|other| **other != own && wanted.agrees_with(other)).collect();
             assert!(wrong.is_empty(), "{}: {wrong:?}", model.description.name);
         }
     }

@@ -37,6 +37,15 @@ impl Entry {
         if self.numbered { format!("{}:{}", self.name, self.object.sub) } else { self.name.clone() }
     }
 
+    /// Whether `name` is the full name. Compares without building the name, because look-ups compare all entries.
+    fn has_full_name(&self, name: &str) -> bool {
+        match name.strip_prefix(&self.name) {
+            Some(rest) if self.numbered => rest.strip_prefix(':').is_some_and(|sub| sub == self.object.sub.to_string()),
+            Some(rest) => rest.is_empty(),
+            None => false,
+        }
+    }
+
     /// Returns the default in wire order; `node` is the node-ID in `$NODEID`. `None` if no default is known.
     pub fn default_bytes(&self, node: NodeId) -> Option<Vec<u8>> {
         self.default.as_ref()?.encode(self.data_type, node).ok()
@@ -134,7 +143,7 @@ impl Dictionary {
 
     fn find_exact(&self, name: &str) -> Option<&Entry> {
         let alias = || self.get(*self.aliases.get(name)?);
-        self.iter().find(|entry| entry.full_name() == name).or_else(alias)
+        self.iter().find(|entry| entry.has_full_name(name)).or_else(alias)
     }
 
     /// Adds an entry of a device description, with every sub-index of a run.

@@ -10,6 +10,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+pub(super) use load::read_identify;
 pub use load::{read, read_with_notes};
 pub use object::{Access, ObjectEntry, ObjectRun, Signature, StoreGroup};
 
@@ -182,7 +183,7 @@ pub struct Range {
 
 /// The answers that identify a device. Each value that is given must agree. A description without values is used only
 /// if the user names it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Identify {
     /// 1000h, all 32 bits.
     pub device_type: Option<u32>,
