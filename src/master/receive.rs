@@ -63,7 +63,8 @@ impl SdoClient {
 
     /// Starts the time-outs that have not started yet.
     fn start_timeouts(&mut self, now: Mono, timing: &Timing) {
-        for active in self.nodes.values_mut().filter_map(|node| node.active.as_mut()) {
+        for number in &self.open {
+            let Some(active) = self.nodes.get_mut(number).and_then(|node| node.active.as_mut()) else { continue };
             if active.read_clock_at.take().is_some() {
                 active.start_timeout(now, timing);
             }

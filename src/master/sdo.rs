@@ -18,7 +18,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::ErrorControlMessage;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, TransferError, proves_upload_answer_60};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 /// A request whose answer was not received in time. The answer may still come.
@@ -50,6 +50,10 @@ type Finished = VecDeque<(Ticket, Result<Answer, SdoError>)>;
 #[derive(Debug, Default)]
 pub(super) struct SdoClient {
     pub(super) nodes: BTreeMap<NodeId, Node>,
+    /// The nodes that can have a transfer. After a scan most nodes have none, and are not searched for each frame.
+    pub(super) open: BTreeSet<NodeId>,
+    /// The nodes that have answered.
+    answered: BTreeSet<NodeId>,
     finished: Finished,
     next_ticket: u64,
     /// A lower bound of the next deadline. It avoids a search through all nodes for each frame.
@@ -83,6 +87,7 @@ impl SdoClient {
         let ticket = Ticket { number: self.next_ticket, node: request.node };
         self.next_ticket += 1;
         let node = self.nodes.entry(request.node).or_default();
+        self.open.insert(request.node);
         node.waiting.push_back((ticket, request));
         self.can_start |= node.active.is_none();
         ticket
@@ -93,7 +98,11 @@ impl SdoClient {
     }
 
     pub(super) fn is_busy(&self) -> bool {
-        self.has_finished() || self.nodes.values().any(|node| node.active.is_some() || !node.waiting.is_empty())
+        self.has_finished() || self.open_nodes().any(Node::is_open)
+    }
+
+    fn open_nodes(&self) -> impl Iterator<Item = &Node> {
+        self.open.iter().filter_map(|number| self.nodes.get(number))
     }
 
     /// Whether [`SdoClient::advance`] would start something.
@@ -120,7 +129,9 @@ impl SdoClient {
             return;
         }
         let on_two_devices = self.on_two_devices;
-        for node in self.nodes.values_mut() {
+        self.open.retain(|number| self.nodes.get(number).is_some_and(Node::is_open));
+        for number in &self.open {
+            let Some(node) = self.nodes.get_mut(number) else { continue };
             if node.active.is_some() {
                 continue;
             }
@@ -177,7 +188,7 @@ impl SdoClient {
     }
 
     pub(super) fn active_transfers(&self) -> impl Iterator<Item = &ActiveTransfer> {
-        self.nodes.values().filter_map(|node| node.active.as_ref())
+        self.open_nodes().filter_map(|node| node.active.as_ref())
     }
 
     /// Computes the next deadline from all transfers.
@@ -239,6 +250,7 @@ impl SdoClient {
         let is_stale = node.has_stale(&received.frame);
         let is_ours = node.on_frame(received, timing, outgoing, &mut self.finished);
         if is_ours {
+            self.answered.insert(number);
             self.missed_answers.on_answer(number);
         } else if !is_stale {
             self.missed_answers.on_channel(number, &received.frame, received.at.mono);
@@ -257,7 +269,8 @@ impl SdoClient {
         }
         self.handle_timeouts(now, timing, outgoing);
         self.update_due();
-        self.can_start = self.nodes.values().any(|node| node.active.is_none() && !node.waiting.is_empty());
+        let can_start = self.open_nodes().any(|node| node.active.is_none() && !node.waiting.is_empty());
+        self.can_start = can_start;
     }
 
     fn handle_timeouts(&mut self, now: Mono, timing: &Timing, outgoing: &mut Outgoing) {
@@ -339,6 +352,7 @@ impl SdoClient {
     /// Takes over what another client found out about its nodes.
     pub(super) fn merge(&mut self, other: SdoClient) {
         self.unusual_heartbeats.extend(other.unusual_heartbeats);
+        self.answered.extend(other.answered);
         for (id, other) in other.nodes {
             let node = self.nodes.entry(id).or_default();
             node.answers = other.answers;
@@ -370,7 +384,8 @@ impl SdoClient {
         if self.is_busy() {
             return None;
         }
-        self.nodes.values().filter_map(|node| node.answers.wait_until()).max()
+        let answered = self.answered.iter().filter_map(|number| self.nodes.get(number));
+        answered.filter_map(|node| node.answers.wait_until()).max()
     }
 
     /// Records that the master has waited for second answers until `now`.
@@ -399,6 +414,11 @@ fn earlier(one: Option<Mono>, other: Option<Mono>) -> Option<Mono> {
 }
 
 impl Node {
+    /// Whether a transfer is in progress or waiting.
+    fn is_open(&self) -> bool {
+        self.active.is_some() || !self.waiting.is_empty()
+    }
+
     /// The object for a barrier read: not `object`, and without a stale request.
     fn barrier(&self, object: ObjectId) -> ObjectId {
         let is_fresh =
