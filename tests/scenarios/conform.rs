@@ -1,7 +1,8 @@
-//! `conform` on the simulated devices, with one deviation each, and interrupted at every frame.
+//! `conform` on the simulated devices, with one deviation each, and interrupted.
 
 mod deviant;
 mod eds_text;
+mod interrupted;
 mod table;
 mod table_404;
 mod table_eds;
@@ -29,8 +30,6 @@ use cangauge::tasks::{Failure, Kind};
 use deviant::{Deviant, Deviation, NODE, Switch};
 use eds_text::eds_text;
 use std::collections::{BTreeMap, BTreeSet};
-use std::iter::StepBy;
-use std::ops::Range;
 use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
@@ -349,143 +348,4 @@ fn fixed_bit_rate_that_ends_automatic_detection_is_not_stored() {
         let is_store = |frame: &Frame| frame.id() == CanId::LSS_MASTER && frame.data()[0] == 0x17;
         assert_eq!(bus.sent.iter().any(is_store), is_stored, "{kind}");
     }
-}
-
-/// Ctrl-C after some frames of each area. The device has its old settings and its old state.
-#[test]
-fn an_interrupted_check_restores_the_device() {
-    for area in Area::ALL {
-        for kind in ["mh4", "d20", "mc1609", "dps"] {
-            let step = if kind == "mh4" { 37 } else { 151 };
-            let store = matches!(area, Area::Eds | Area::Lss);
-            let wrong = interrupted(kind, area, store, |count| (SEARCH..count).step_by(step.max(count / 15)));
-            assert_eq!(wrong, [""; 0]);
-        }
-    }
-}
-
-#[test]
-fn late_answer_to_an_interrupted_write_leaves_no_setting_unrestored() {
-    assert_eq!(interrupted("dps", Area::Emcy, false, each), [""; 0]);
-}
-
-#[test]
-fn interrupted_life_guarding_leaves_no_error() {
-    // The last case but one sets the life time.
-    let last = |count: usize| (count - 100..count).step_by(1);
-    assert_eq!(interrupted("mc1609", Area::ErrorControl, false, last), [""; 0]);
-}
-
-/// Ctrl-C after each frame. One test for each device, so that they run in parallel.
-mod every_frame {
-    use super::*;
-
-    fn all_areas(kind: &str, store: bool) {
-        let wrong: Vec<String> = Area::ALL.into_iter().flat_map(|area| interrupted(kind, area, store, each)).collect();
-        assert_eq!(wrong, [""; 0]);
-    }
-
-    #[test]
-    #[ignore = "takes minutes: .ci/long interrupts"]
-    fn mh4() {
-        all_areas("mh4", false);
-    }
-
-    #[test]
-    #[ignore = "takes minutes: .ci/long interrupts"]
-    fn mh4_with_store() {
-        all_areas("mh4", true);
-    }
-
-    #[test]
-    #[ignore = "takes minutes: .ci/long interrupts"]
-    fn d20() {
-        all_areas("d20", false);
-    }
-
-    #[test]
-    #[ignore = "takes minutes: .ci/long interrupts"]
-    fn d20_with_store() {
-        all_areas("d20", true);
-    }
-
-    #[test]
-    #[ignore = "takes minutes: .ci/long interrupts"]
-    fn mc1609() {
-        all_areas("mc1609", false);
-    }
-
-    #[test]
-    #[ignore = "takes minutes: .ci/long interrupts"]
-    fn mc1609_with_store() {
-        all_areas("mc1609", true);
-    }
-
-    #[test]
-    #[ignore = "takes minutes: .ci/long interrupts"]
-    fn dps() {
-        all_areas("dps", false);
-    }
-
-    #[test]
-    #[ignore = "takes minutes: .ci/long interrupts"]
-    fn dps_with_store() {
-        all_areas("dps", true);
-    }
-}
-
-/// The device works for two seconds.
-fn run_on(bus: &mut MemoryBus) {
-    let until = Mono::at(bus.mono().since_start() + Duration::from_secs(2));
-    while bus.receive(until).expect("the bus works") != Event::Timeout {}
-}
-
-/// The first frames search the bus for other nodes.
-const SEARCH: usize = 260;
-
-/// The numbers of frames after which a check is interrupted.
-type FrameNumbers = StepBy<Range<usize>>;
-
-fn each(count: usize) -> FrameNumbers {
-    (SEARCH..count).step_by(1)
-}
-
-/// Interrupts the cases of an area after each chosen frame. Returns the differences from before.
-fn interrupted(kind: &str, area: Area, store: bool, chosen: impl Fn(usize) -> FrameNumbers) -> Vec<String> {
-    let file = (area == Area::Eds).then(|| eds(kind, &[]));
-    let options = ConformOptions { only: vec![area], store, eds: file, ..ConformOptions::default() };
-    let mut clean = FaultyBus::new(bus(kind, None), Fault::None, 0);
-    let before = contents(&mut clean.bus);
-    run(&mut clean, kind, &options).expect("a report");
-    let count = clean.sent.len();
-    let mut wrong = Vec::new();
-    for at in chosen(count) {
-        let mut faulty = FaultyBus::new(bus(kind, None), Fault::Interrupt, at);
-        let result = run(&mut faulty, kind, &options);
-        let mut bus = faulty.bus;
-        run_on(&mut bus);
-        let mut found = differences(&mut bus, &before);
-        let station = bus.stations_mut::<Deviant>().next().expect("the device");
-        if station.device.is_configuring() || !station.has_old_address() {
-            found.push("the device has another node-ID or bit rate, or is in configuration state".to_owned());
-        }
-        bus.power_cycle();
-        run_on(&mut bus);
-        found.extend(differences(&mut bus, &before).into_iter().map(|one| format!("after a power cycle: {one}")));
-        match result {
-            Ok(report) => {
-                found.extend(report.not_restored.iter().map(|object| format!("not restored: {object}")));
-                found.extend(report.history.map(|change| format!("{change:?}")));
-            }
-            Err(failure) if failure.kind() == Kind::Interrupted && failure.effects.is_empty() => {}
-            Err(failure) => found.push(format!("{failure}: {:?}", failure.effects)),
-        }
-        if Switch::input() != Input::Normal {
-            found.push("the input is not normal".to_owned());
-        }
-        if !found.is_empty() {
-            wrong.push(format!("{kind} {area}, store {store}, {at} of {count} ({}): {found:?}", clean.sent[at]));
-        }
-    }
-    wrong
 }

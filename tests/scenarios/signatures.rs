@@ -5,7 +5,7 @@ use cangauge::bus::memory::MemoryBus;
 use cangauge::bus::time::Mono;
 use cangauge::bus::{Bus, BusError, Event, Received};
 use cangauge::canopen::frame::Frame;
-use cangauge::canopen::id::NodeId;
+use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
 use cangauge::master::{Master, Timing};
 use cangauge::node::write::write;
@@ -124,7 +124,7 @@ impl Bus for FaultyBus {
         loop {
             let event = self.inner.receive(deadline)?;
             if let Event::Frame(received) = &event
-                && received.frame.to_string().starts_with("585#")
+                && received.frame.id() == CanId::sdo_response(node())
             {
                 if std::mem::take(&mut self.restarts) {
                     self.inner.send(&"000#8105".parse().expect("a frame"))?;
