@@ -82,9 +82,11 @@ impl Bits {
 
     /// Returns the CRC-15. Zeros before the first bit do not change it.
     fn crc(&self) -> u16 {
-        let mut crc = 0;
-        for byte in self.value.to_be_bytes() {
-            crc = crc << 8 & 0x7fff ^ CRC_TABLE[usize::from(crc >> 7) ^ usize::from(byte)];
+        let (mut crc, mut left) = (0, self.length.next_multiple_of(8));
+        while left > 0 {
+            left -= 8;
+            let byte = (self.value >> left & 0xff) as usize;
+            crc = crc << 8 & 0x7fff ^ CRC_TABLE[usize::from(crc >> 7) ^ byte];
         }
         crc
     }
@@ -95,9 +97,14 @@ impl Bits {
         let mut rest = self.value << (u128::BITS - self.length);
         let (mut left, mut count, mut stuffed) = (self.length, 0, 0);
         while left > 0 {
-            let run = rest.leading_zeros().max(rest.leading_ones()).min(left);
+            // Only the lengths of the runs matter: the first run always consists of zeros.
+            if rest >> 127 == 1 {
+                rest = !rest;
+            }
+            let zeros = rest.leading_zeros();
+            let run = if zeros < left { zeros } else { left };
             left -= run;
-            rest = rest.checked_shl(run).unwrap_or_default();
+            rest <<= run;
             count += (stuffed + run) / 5;
             stuffed = u32::from((stuffed + run) % 5 == 0);
         }
