@@ -27,6 +27,15 @@ impl Mono {
     pub fn since(self, earlier: Mono) -> Duration {
         self.0.saturating_sub(earlier.0)
     }
+
+    /// Returns the earlier of two moments, or the only one.
+    pub fn earlier(one: Option<Mono>, other: Option<Mono>) -> Option<Mono> {
+        match (one, other) {
+            (Some(one), Some(other)) => Some(if other < one { other } else { one }),
+            (one, None) => one,
+            (None, other) => other,
+        }
+    }
 }
 
 /// Saturates at the last moment of the type.

@@ -182,7 +182,7 @@ impl SdoClient {
                         self.awaits_clock = true;
                     }
                 }
-                self.due = earlier(self.due, active.due());
+                self.due = Mono::earlier(self.due, active.due());
             }
         }
     }
@@ -206,7 +206,7 @@ impl SdoClient {
     /// A moment not later than the next time-out of a transfer.
     pub(super) fn next_deadline(&self) -> Option<Mono> {
         let limit = self.limit.filter(|_| self.is_busy()).map(|(until, _)| until);
-        earlier(self.due, limit)
+        Mono::earlier(self.due, limit)
     }
 
     /// Sets when all transfers together must have ended, and the time that they have.
@@ -256,7 +256,7 @@ impl SdoClient {
             self.missed_answers.on_channel(number, &received.frame, received.at.mono);
         }
         node.accept_60 |= is_ours && proves_upload_answer_60(&received.frame);
-        self.due = earlier(self.due, node.active.as_ref().and_then(|active| active.deadline));
+        self.due = Mono::earlier(self.due, node.active.as_ref().and_then(|active| active.deadline));
         self.can_start |= node.active.is_none() && !node.waiting.is_empty();
         is_ours
     }
@@ -407,10 +407,6 @@ impl SdoClient {
         self.missed_answers.cancel();
         (self.due, self.can_start) = (None, false);
     }
-}
-
-fn earlier(one: Option<Mono>, other: Option<Mono>) -> Option<Mono> {
-    one.into_iter().chain(other).min()
 }
 
 impl Node {

@@ -371,7 +371,10 @@ impl Device {
 
     fn is_sync(&self, frame: &Frame) -> bool {
         let objects = &self.memory.objects;
-        let id = if objects.has(COB_ID_SYNC) { objects.number(COB_ID_SYNC) & 0x7ff } else { CanId::SYNC.number() };
+        let id = match objects.number(COB_ID_SYNC) {
+            0 if !objects.has(COB_ID_SYNC) => CanId::SYNC.number(),
+            cob_id => cob_id & 0x7ff,
+        };
         !frame.is_remote() && matches!(frame.id(), CanId::Standard(found) if u32::from(found) == id)
     }
 

@@ -177,7 +177,7 @@ impl Emergencies {
     pub(super) fn next_wake(&self) -> Option<Mono> {
         let waiting = self.waiting.front().map(|_| self.inhibited_until);
         let next_repeat = self.next_repeat.map(|(_, due)| due);
-        waiting.into_iter().chain(next_repeat).min()
+        Mono::earlier(waiting, next_repeat)
     }
 }
 

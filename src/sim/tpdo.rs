@@ -198,7 +198,7 @@ impl Tpdo {
 
     /// The next time at which [`Tpdo::wake`] must be called.
     pub(super) fn next_wake(&self) -> Option<Mono> {
-        [self.timer, self.held_back, self.compare_at].into_iter().flatten().min()
+        Mono::earlier(Mono::earlier(self.timer, self.held_back), self.compare_at)
     }
 
     /// Records a transmission. Returns `false` if nothing is sent because nothing changed.

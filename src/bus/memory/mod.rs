@@ -178,11 +178,9 @@ impl MemoryBus {
             Wire::Busy(transmission) => Some(transmission.complete),
             Wire::Free(from) => self.contenders().map(|(ready, ..)| ready.max(*from)).min(),
         };
-        let mut next = wire.into_iter().chain(self.interrupts.first().copied()).min();
+        let mut next = Mono::earlier(wire, self.interrupts.first().copied());
         for place in &self.places {
-            if let Some(due) = place.next_wake {
-                next = Some(next.map_or(due, |next| next.min(due)));
-            }
+            next = Mono::earlier(next, place.next_wake);
         }
         next.map(|moment| moment.max(self.now))
     }

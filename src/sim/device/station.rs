@@ -39,11 +39,7 @@ impl Station for Device {
             Phase::Retiming { switch, until, .. } => Some(switch.unwrap_or(until)),
             Phase::Running(_) => {
                 let mut next = self.heartbeat;
-                let mut add = |moment: Option<Mono>| {
-                    if let Some(moment) = moment {
-                        next = Some(next.map_or(moment, |next| next.min(moment)));
-                    }
-                };
+                let mut add = |moment: Option<Mono>| next = Mono::earlier(next, moment);
                 add(self.sdo.deadline());
                 add(self.life_end());
                 add(self.next_overload_change);
@@ -53,7 +49,7 @@ impl Station for Device {
                 next
             }
         };
-        self.connections.front().copied().into_iter().chain(own).min()
+        Mono::earlier(self.connections.front().copied(), own)
     }
 
     fn sent(&mut self, now: Mono, frame: &Frame) {
