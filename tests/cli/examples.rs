@@ -5,6 +5,7 @@ mod texts;
 
 use super::Bench;
 use std::collections::BTreeSet;
+use std::sync::Mutex;
 use std::thread;
 use texts::{examples, without_redirection};
 pub(super) use texts::{readme, words};
@@ -27,8 +28,12 @@ fn every_example_on_the_simulated_bus_works() {
         assert!(!done.stdout.is_empty() || !bench.files().is_empty() || example.contains(" sdo write "), "{example}");
     };
     // On the real clock, as for users. Not all at once: on a busy machine, the simulated devices would answer too late.
-    let left: Vec<&String> = examples.iter().filter(|example| !TOO_LONG.contains(&example.as_str())).collect();
-    for some in left.chunks(6) {
-        thread::scope(|scope| some.iter().for_each(|example| drop(scope.spawn(|| run(example)))));
-    }
+    let left = Mutex::new(examples.iter().filter(|example| !TOO_LONG.contains(&example.as_str())));
+    let next = || left.lock().expect("no panic while locked").next();
+    let work = || {
+        while let Some(example) = next() {
+            run(example);
+        }
+    };
+    thread::scope(|scope| (0..6).for_each(|_| drop(scope.spawn(work))));
 }
