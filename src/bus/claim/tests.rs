@@ -143,7 +143,8 @@ fn a_holder_that_never_accepts_does_not_block_others() {
         assert!(started.elapsed() < Duration::from_secs(5), "{:?}", started.elapsed());
         assert!(refused.to_string().ends_with(&format!(" is in use by {}", this_process())), "{refused}");
         drop(holder);
-        assert!(take(&bus, &claim, 0).is_ok());
+        // A program that another test starts has a copy of the socket until its first instruction.
+        take(&bus, &claim, 2000).expect("free");
     }
 }
 
