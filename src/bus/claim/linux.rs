@@ -7,19 +7,16 @@
 use super::holder::identify;
 use super::{Claim, ClaimError, Holder, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
-use crate::bus::{poll, socketcan};
+use crate::bus::socketcan;
 use crate::canopen::id::NodeId;
 use std::io::{self, ErrorKind};
-use std::os::fd::AsFd;
 use std::os::linux::net::SocketAddrExt;
-use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
-use std::sync::Arc;
-use std::thread::JoinHandle;
+use std::os::unix::net::{SocketAddr, UnixListener};
 use std::time::{Duration, Instant};
 
 /// Shorter waits are not reported, because most commands end sooner.
 const SHORT_WAIT: Duration = Duration::from_millis(500);
-/// The interval between two attempts to get a name, and between two checks of the queues of a holder.
+/// The interval between two attempts to get a name.
 const RETRY_INTERVAL: Duration = Duration::from_millis(20);
 /// More nodes than this are claimed as every node. Each name needs a file descriptor.
 const MAX_SINGLE_NODES: usize = 16;
@@ -27,11 +24,10 @@ const MAX_SINGLE_NODES: usize = 16;
 /// The claims of this process. They are released when the value is dropped or the process ends.
 #[derive(Debug, Default)]
 pub struct Claims {
+    /// No connection is accepted. A process that asks for the holder of a name connects, and stays in the queue of the
+    /// socket (4096 connections on Linux). If the queue is full, that process searches `/proc` for the holder.
     #[cfg_attr(not(test), expect(dead_code, reason = "a name is held while its socket is open"))]
-    listeners: Arc<[UnixListener]>,
-    /// Closing this socket ends the `drain` thread.
-    stop: Option<UnixStream>,
-    drain: Option<JoinHandle<()>>,
+    listeners: Vec<UnixListener>,
 }
 
 impl Claims {
@@ -64,55 +60,13 @@ impl Claims {
             held: Vec::new(),
         };
         while !attempt.take_all(&parts)? {}
-        Ok(Claims::hold(attempt.held))
-    }
-
-    fn hold(listeners: Vec<UnixListener>) -> Claims {
-        let listeners: Arc<[UnixListener]> = listeners.into();
-        let Ok((stop, stopped)) = UnixStream::pair() else {
-            return Claims { listeners, stop: None, drain: None };
-        };
-        let ours = Arc::clone(&listeners);
-        let thread = std::thread::Builder::new().name("claims".to_owned()).spawn(move || drain(&ours, &stopped));
-        Claims { listeners, stop: Some(stop), drain: thread.ok() }
+        Ok(Claims { listeners: attempt.held })
     }
 
     /// The number of names held.
     #[cfg(test)]
     pub(super) fn names(&self) -> usize {
         self.listeners.len()
-    }
-}
-
-impl Drop for Claims {
-    fn drop(&mut self) {
-        self.stop = None;
-        // The thread also holds the names: they are released when it ends.
-        if let Some(thread) = self.drain.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-/// Empties the queues of the sockets until `stopped` is closed. Each process that asks for the holder of a name
-/// connects. Without this thread, the connection would stay in the queue until the holder ends.
-fn drain(listeners: &[UnixListener], stopped: &UnixStream) {
-    let sources = listeners.iter().map(AsFd::as_fd).chain([stopped.as_fd()]);
-    let fds: Vec<_> = sources.map(|fd| (fd, false)).collect();
-    loop {
-        match poll::ready(&fds, Duration::MAX) {
-            Ok(ready) if ready.last() == Some(&true) => return,
-            Ok(_) => {}
-            Err(_) => return,
-        }
-        for listener in listeners {
-            while listener.accept().is_ok() {}
-        }
-        // A process that connects continuously must not keep this one busy.
-        match poll::readable([stopped.as_fd()], RETRY_INTERVAL) {
-            Ok([false]) => {}
-            Ok([true]) | Err(_) => return,
-        }
     }
 }
 

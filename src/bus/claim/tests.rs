@@ -4,7 +4,7 @@ use super::*;
 use socket2::{Domain, SockAddr, Socket, Type};
 use std::io;
 use std::os::linux::net::SocketAddrExt;
-use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
+use std::os::unix::net::{SocketAddr, UnixListener};
 use std::time::Instant;
 
 fn nodes(nodes: &[u8]) -> Claim {
@@ -155,30 +155,6 @@ fn a_name_without_a_listener_is_held_too() {
     socket.bind(&SockAddr::unix(format!("\0cangauge/{bus}/5")).expect("a short name")).expect("free");
     let refused = take(&bus, &nodes(&[5]), 0).expect_err("held");
     assert_eq!(refused.to_string(), format!("node 5 is in use by {}", this_process()));
-}
-
-#[test]
-fn a_holder_empties_its_queue() {
-    let bus = bus("drain");
-    let held = take(&bus, &nodes(&[5]), 0).expect("free");
-    // More connections than the longest queue holds (net.core.somaxconn).
-    let longest = std::fs::read_to_string("/proc/sys/net/core/somaxconn").expect("procfs");
-    let longest: usize = longest.trim().parse().expect("a number");
-    let path = format!("\0cangauge/{bus}/5");
-    let deadline = Instant::now() + Duration::from_secs(60);
-    for _ in 0..longest + 100 {
-        loop {
-            let socket = Socket::new(Domain::UNIX, Type::STREAM.nonblocking(), None).expect("a socket");
-            match socket.connect(&SockAddr::unix(&path).expect("a short name")) {
-                Ok(()) => break,
-                Err(_) => assert!(Instant::now() < deadline, "the queue stays full"),
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-    assert!(UnixStream::connect_addr(&address(&bus, "5")).is_ok());
-    drop(held);
-    assert!(take(&bus, &nodes(&[5]), 0).is_ok());
 }
 
 #[test]
