@@ -66,7 +66,11 @@ def latency(directory):
         report("latency", line, far, "s", f"without latency {near:.3f} s; waits", (far - near) * 1000 / LATENCY_MS)
 
 
-def growth(directory, largest=7):
+# The length of a line in a recording, in bytes.
+LINE = 38
+
+
+def growth(directory, largest=8):
     """growth of cost with nodes, frames and expressions"""
     for nodes in (1, 4, 16, 64, 127):
         devices = [f'kind = "mh4"\nnode = {node}' for node in range(1, nodes + 1)]
@@ -82,11 +86,11 @@ def growth(directory, largest=7):
     recording = os.path.join(directory, "frames.log")
     setup = [frame for _, frame in Traced(directory, ['kind = "dps"\nnode = 1'], "log", "1", "--duration", "1s").frames]
     for exponent in range(3, largest + 1):
-        write_recording(recording, setup, 10**exponent)
+        frames = 10**exponent // LINE
+        write_recording(recording, setup, frames)
         log = [BINARY, "-q", "-b", "replay:" + recording, "log", "1", "--passive", "-o", os.path.join(directory, "rows"), "--force"]
         took, memory = measured(log)
-        size = os.path.getsize(recording) / 1e6
-        report("growth", f"replay, 10^{exponent} frames, {size:.2f} MB, {memory:.1f} MB memory", took, "s", "per frame, us", took * 1e6 / 10**exponent)
+        report("growth", f"replay, 10^{exponent} bytes, {memory:.1f} MB memory", took, "s", "per frame, us", took * 1e6 / frames)
     frames = 10**5
     write_recording(recording, setup, frames)
     for count in (1, 10, 100, 1000):
