@@ -10,7 +10,7 @@ use std::{env, fs, io};
 /// Pairs of a folder with one TOML file per entry, and the generated file that lists their names and texts.
 const LISTS: [(&str, &str); 2] = [("src/device/devices", "devices.rs"), ("src/sim/models", "models.rs")];
 
-/// A linker script with the functions of `sdo read` in the order of their first use. `.ci/static --order` writes it.
+/// A linker script with the functions of `sdo read` in the order of their first use. `.ci/order` writes it.
 const ORDER: &str = "src/order.ld";
 
 fn main() -> io::Result<()> {
@@ -36,10 +36,9 @@ fn rerun_if_changed(path: &str) {
 #[allow(clippy::print_stdout, reason = "this is how a build script speaks to cargo")]
 fn link_for_quick_start(order: &Path, out: &Path) -> io::Result<()> {
     let has_value = |name: &str, value: &str| env::var(name).is_ok_and(|found| found == value);
-    let is_static = env::var("CARGO_CFG_TARGET_FEATURE").is_ok_and(|all| all.split(',').any(|one| one == "crt-static"));
-    // A program for another system cannot be run here. The static program has its own order (.ci/static).
+    // A program for another system cannot be run here.
     let is_native = env::var_os("HOST") == env::var_os("TARGET");
-    if !has_value("PROFILE", "release") || !has_value("CARGO_CFG_TARGET_OS", "linux") || !is_native || is_static {
+    if !has_value("PROFILE", "release") || !has_value("CARGO_CFG_TARGET_OS", "linux") || !is_native {
         return Ok(());
     }
     for option in [format!("-Wl,-T,{}", order.display()), "-Wl,-z,pack-relative-relocs".to_owned()] {
