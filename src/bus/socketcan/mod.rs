@@ -1,11 +1,13 @@
 //! Linux SocketCAN: kernel filters, timestamps of the interface or the kernel, the kernel's drop counter, error
 //! frames.
 //!
-//! A system call costs more than all other work for a frame. So one `recvmmsg` serves up to 64 calls of `receive`. The
-//! clock is read once for all of them. The program waits for the socket only after the socket was found empty.
+//! A system call costs more than all other work for a frame. So one `recvmmsg` serves up to 64 calls of `receive`, with
+//! one reading of the clock. The program waits only after the socket was found empty. In dense traffic, frames collect in
+//! the kernel first ([`dense`]).
 
 mod clocks;
 mod convert;
+mod dense;
 mod faults;
 mod interfaces;
 mod netlink;
@@ -23,6 +25,7 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use clocks::Clocks;
 use convert::{from_kernel, to_kernel};
+use dense::Traffic;
 pub use interfaces::{Interface, interfaces};
 pub use netlink::{BitTiming, Link, State};
 use receive::{Batch, Message};
@@ -37,8 +40,7 @@ use std::time::{Duration, Instant};
 
 /// The interval at which an interface is checked for being up again, because the kernel does not report it.
 const LINK_CHECK_INTERVAL: Duration = Duration::from_millis(200);
-/// The first wait after a send. It does not read the clock or check for signals. An answer within this time costs one
-/// system call instead of four.
+/// The first wait after a send. It costs one system call, because it does not read the clock or check for signals.
 const ANSWER_TIME: Duration = Duration::from_millis(10);
 /// The number of waits of [`ANSWER_TIME`] after a send, if each of them receives a frame: the segments of a block.
 const ANSWERS: u8 = 127;
@@ -62,6 +64,7 @@ pub struct SocketCan {
     is_drained: bool,
     /// The number of further answers that may come soon after the last send.
     expected_answers: u8,
+    traffic: Traffic,
     /// The last reading of the clock.
     last_clock_reading: Cell<Mono>,
     /// Events to deliver before the rest of the batch.
@@ -126,6 +129,7 @@ impl SocketCan {
             last_frame_at: Mono::START,
             is_drained: false,
             expected_answers: 0,
+            traffic: Traffic::new(),
             last_clock_reading: Cell::new(Mono::START),
             ready: VecDeque::new(),
             is_up: true,
@@ -189,6 +193,7 @@ impl SocketCan {
         let limit = if wait && self.expected_answers == ANSWERS - 1 { 1 } else { receive::BATCH };
         match self.batch.fill(self.socket.as_fd(), wait, limit) {
             Ok(count) => {
+                self.traffic.on_batch(count, self.last_frame_at);
                 self.is_drained = count < receive::BATCH;
                 if wait {
                     // An upper estimate of the receive time. A later frame causes a new comparison of the clocks.
@@ -207,8 +212,8 @@ impl SocketCan {
                 Some(libc::EAGAIN) => {
                     self.is_drained = true;
                     if wait {
-                        // The sender may only pause, so these waits go on. The clock is read, so that they end before
-                        // the deadline.
+                        self.traffic.on_silence();
+                        // The sender may only pause, so these waits go on. With the clock, they end before the deadline.
                         self.expected_answers = self.expected_answers.saturating_sub(ANSWERS / 4);
                         self.mono();
                     }
@@ -334,6 +339,9 @@ impl SocketCan {
                 self.fill(false)?;
             } else if self.expected_answers > 0 && self.is_up && allows_wait {
                 self.expected_answers -= 1;
+                if deadline.is_some() && self.traffic.can_collect(self.last_frame_at, self.latest()) {
+                    std::thread::sleep(dense::COLLECT_TIME);
+                }
                 if !self.fill(true)? && deadline.is_none() {
                     return Ok(None);
                 }
@@ -456,6 +464,7 @@ impl Bus for SocketCan {
             return Err(BusError::ListenOnly(self.name.clone()));
         }
         self.expected_answers = ANSWERS;
+        self.traffic.on_send(self.latest());
         self.socket.write_frame(&to_kernel(frame)).map_err(|error| {
             // The kernel reports these errors only once, to the first call.
             match error.raw_os_error() {
