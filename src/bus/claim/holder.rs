@@ -57,10 +57,11 @@ fn peer(name: &[u8]) -> io::Result<libc::ucred> {
 fn owner(name: &[u8]) -> Option<u32> {
     let sockets = fs::read("/proc/self/net/unix").ok()?;
     let ending = [b" @", name].concat();
-    // Connections that wait in the queue have the same name, but do not belong to a process.
     let lines = sockets.split(|&byte| byte == b'\n').filter(|line| line.ends_with(&ending));
     // Num: RefCount Protocol Flags Type St Inode Path
     let inodes = lines.filter_map(|line| std::str::from_utf8(line).ok()?.split_ascii_whitespace().nth(6));
+    // Connections in the queue have the same name and inode 0. They do not belong to a process.
+    let inodes = inodes.filter(|&inode| inode != "0");
     let targets: Vec<PathBuf> = inodes.map(|inode| PathBuf::from(format!("socket:[{inode}]"))).collect();
     let processes = fs::read_dir("/proc").ok()?.flatten();
     processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).find(|process: &u32| {

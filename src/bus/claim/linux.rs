@@ -5,7 +5,7 @@
 //! claim at the same time, at least one detects the other. The process with single nodes then releases them and waits.
 
 use super::holder::identify;
-use super::{Claim, ClaimError, Holder, IfHeld, Part};
+use super::{Claim, ClaimError, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
 use crate::bus::socketcan;
 use crate::canopen::id::NodeId;
@@ -24,8 +24,8 @@ const MAX_SINGLE_NODES: usize = 16;
 /// The claims of this process. They are released when the value is dropped or the process ends.
 #[derive(Debug, Default)]
 pub struct Claims {
-    /// No connection is accepted. A process that asks for the holder of a name connects, and stays in the queue of the
-    /// socket (4096 connections on Linux). If the queue is full, that process searches `/proc` for the holder.
+    /// No connection is accepted. A process that asks for the holder of a name connects, and the connection stays in the
+    /// queue of the socket. If the queue is full (`net.core.somaxconn`, usually 4096), that process searches `/proc`.
     #[cfg_attr(not(test), expect(dead_code, reason = "a name is held while its socket is open"))]
     listeners: Vec<UnixListener>,
 }
@@ -49,16 +49,8 @@ impl Claims {
         }
         let key = socketcan::primary_name(name).unwrap_or_else(|| name.to_owned());
         let started = Instant::now();
-        let mut attempt = Attempt {
-            key,
-            if_held,
-            started,
-            interrupts: None,
-            is_reported: false,
-            holder: None,
-            report,
-            held: Vec::new(),
-        };
+        let mut attempt =
+            Attempt { key, if_held, started, interrupts: None, is_reported: false, report, held: Vec::new() };
         while !attempt.take_all(&parts)? {}
         Ok(Claims { listeners: attempt.held })
     }
@@ -93,8 +85,6 @@ struct Attempt<'a> {
     /// Set at the first wait. Until then, Ctrl-C ends the program directly.
     interrupts: Option<Interrupts>,
     is_reported: bool,
-    /// The last part that was in use, and its holder, so that the holder is identified only once.
-    holder: Option<(Part, Holder)>,
     report: &'a mut dyn FnMut(&ClaimError),
     held: Vec<UnixListener>,
 }
@@ -146,11 +136,7 @@ impl Attempt<'_> {
 
     fn bind(&self, part: Part) -> Result<Bound, ClaimError> {
         let Ok(address) = self.address(part) else { return Ok(Bound::Unavailable) };
-        let listener = UnixListener::bind_addr(&address).and_then(|listener| {
-            listener.set_nonblocking(true)?;
-            Ok(listener)
-        });
-        match listener {
+        match UnixListener::bind_addr(&address) {
             Ok(listener) => Ok(Bound::Acquired(listener)),
             Err(error) if error.kind() == ErrorKind::AddrInUse => Ok(Bound::InUse),
             Err(error) if matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::Unsupported) => {
@@ -166,25 +152,27 @@ impl Attempt<'_> {
         Ok(matches!(self.bind(part)?, Bound::InUse))
     }
 
+    /// The error that shows the holder of a part.
+    fn in_use(&self, part: Part) -> ClaimError {
+        let holder = self.address(part).map(|address| identify(&address)).unwrap_or_default();
+        ClaimError::InUse(part, holder)
+    }
+
     /// Waits a short time for the holder of a part. Returns `false` if the command continues in spite of the holder.
     fn wait_for(&mut self, part: Part) -> Result<bool, ClaimError> {
-        let holder = match self.holder.take() {
-            Some((held_part, holder)) if held_part == part && holder.process.is_some() => holder,
-            _ => self.address(part).map(|address| identify(&address)).unwrap_or_default(),
-        };
-        self.holder = Some((part, holder.clone()));
-        let in_use = ClaimError::InUse(part, holder);
         let IfHeld::Wait(limit) = self.if_held else {
+            let in_use = self.in_use(part);
             (self.report)(&in_use);
             return Ok(false);
         };
         let waited = self.started.elapsed();
         let left = limit.saturating_sub(waited);
         if left.is_zero() {
-            return Err(in_use);
+            return Err(self.in_use(part));
         }
         if waited >= SHORT_WAIT && !self.is_reported {
             self.is_reported = true;
+            let in_use = self.in_use(part);
             (self.report)(&in_use);
         }
         let pause = RETRY_INTERVAL.min(left);

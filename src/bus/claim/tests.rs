@@ -1,4 +1,4 @@
-//! Tests with several holders in one process, and with programs that do not follow the rules.
+//! Tests with several holders in one process, and with full queues.
 
 use super::*;
 use socket2::{Domain, SockAddr, Socket, Type};
@@ -116,8 +116,8 @@ fn continuing_beside_a_holder_reports_it_and_takes_the_rest() {
     }
 }
 
-/// A process that holds a name and never accepts a connection. Its queue is full.
-fn hostile(bus: &str, part: &str) -> (UnixListener, Vec<Socket>) {
+/// A process that holds a name, and whose queue is full.
+fn holder_with_full_queue(bus: &str, part: &str) -> (UnixListener, Vec<Socket>) {
     let listener = UnixListener::bind_addr(&address(bus, part)).expect("free");
     let path = format!("\0cangauge/{bus}/{part}");
     let mut connections = Vec::new();
@@ -134,10 +134,10 @@ fn hostile(bus: &str, part: &str) -> (UnixListener, Vec<Socket>) {
 }
 
 #[test]
-fn a_holder_that_never_accepts_does_not_block_others() {
-    let bus = bus("hostile");
+fn a_full_queue_does_not_block_others() {
+    let bus = bus("full");
     for (part, claim) in [("5", nodes(&[5])), ("5", Claim::every_node()), ("all", nodes(&[5])), ("lss", Claim::Bus)] {
-        let holder = hostile(&bus, part);
+        let holder = holder_with_full_queue(&bus, part);
         let started = Instant::now();
         let refused = take(&bus, &claim, 100).expect_err("held");
         assert!(started.elapsed() < Duration::from_secs(5), "{:?}", started.elapsed());
