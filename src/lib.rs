@@ -27,7 +27,7 @@
 //! - [`output`] → tasks (reports), publish (reports), node, measure, device, canopen (values), bus (time types,
 //!   faults). All sentences, tables and file formats. Part of the feature `cli`.
 //!
-//! The program (`src/main.rs`) adds one layer. It is not part of the library, so that a change of it is built quickly:
+//! The program (`src/main.rs`) adds one layer. It is not part of the library, so a change in it is built faster:
 //!
 //! - `cli` → tasks, output, publish, node, measure, master, sim, bus, device, canopen (values). Arguments and help
 //!   texts, one file for each command.

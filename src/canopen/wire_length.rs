@@ -145,7 +145,7 @@ mod tests {
         header_and_data(&frame(text)).crc()
     }
 
-    /// Computes the CRC by polynomial division of a list of bits, as a reference for the shift register.
+    /// Computes the CRC by polynomial division of a list of bits, as a reference for the table.
     fn remainder(bits: &[u8]) -> u16 {
         let mut rest: Vec<u8> = bits.iter().copied().chain([0; 15]).collect();
         let divisor = [1, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1];
@@ -181,6 +181,18 @@ mod tests {
         assert_eq!(frame_bits(&frame("701#00")), 56);
         assert_eq!(crc("581#8000000000000000"), 7932);
         assert_eq!(frame_bits(&frame("581#8000000000000000")), 124);
+    }
+
+    #[test]
+    fn extended_frames_match_a_separate_program() {
+        for (text, length, checksum) in [
+            ("00000000#", 71, 17936),
+            ("18DAF110#0102", 83, 13860),
+            ("00000601#4000100000000000", 144, 12526),
+            ("1FFFFFFF#R8", 71, 6986),
+        ] {
+            assert_eq!((frame_bits(&frame(text)), crc(text)), (length, checksum), "{text}");
+        }
     }
 
     #[test]
@@ -270,7 +282,9 @@ mod tests {
     proptest! {
         #[test]
         fn lengths_stay_within_the_limits_of_the_standard(frame in any_frame()) {
-            let stuffable = header_and_data(&frame).length + 15;
+            let header = if matches!(frame.id(), CanId::Extended(_)) { 39 } else { 19 };
+            let data = if frame.is_remote() { 0 } else { 8 * u32::from(frame.len()) };
+            let stuffable = header + data + 15;
             let bits = frame_bits(&frame);
             prop_assert!(bits >= stuffable + TAIL_BITS);
             prop_assert!(bits <= stuffable + TAIL_BITS + (stuffable - 1) / 4);

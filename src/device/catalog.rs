@@ -150,11 +150,8 @@ impl Model {
 
     /// Whether both descriptions recognise the same devices.
     pub fn is_for_the_same_device(&self, other: &Model) -> bool {
-        let key = |model: &Model| {
-            let identify = model.description.identify.clone();
-            (identify.device_type, identify.vendor_id, identify.product_code, identify.device_name, identify.confirm)
-        };
-        !self.description.identify.is_empty() && key(self) == key(other)
+        let identify = &self.description.identify;
+        !identify.is_empty() && *identify == other.description.identify
     }
 }
 
@@ -273,7 +270,9 @@ mod tests {
         }
         assert_eq!(built_in().len(), FILES.len());
         for (index, model) in built_in().iter().enumerate() {
-            assert_eq!(*identify(index), model.description.identify, "{}", model.description.name);
+            let name = &model.description.name;
+            let early = "[identify] precedes the arrays of tables";
+            assert_eq!(*identify(index), model.description.identify, "{name}: {early}");
         }
         assert!(names().eq(built_in().iter().map(|model| model.description.name.as_str())));
     }

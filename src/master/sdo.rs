@@ -50,7 +50,8 @@ type Finished = VecDeque<(Ticket, Result<Answer, SdoError>)>;
 #[derive(Debug, Default)]
 pub(super) struct SdoClient {
     pub(super) nodes: BTreeMap<NodeId, Node>,
-    /// The nodes that can have a transfer. After a scan most nodes have none, and are not searched for each frame.
+    /// Contains each node with a transfer in progress or waiting. A node without one is removed later. After a scan most
+    /// nodes have no transfer: they are not searched for each frame.
     pub(super) open: BTreeSet<NodeId>,
     /// The nodes that have answered.
     answered: BTreeSet<NodeId>,

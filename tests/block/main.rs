@@ -215,7 +215,7 @@ fn has_announced_size(uploaded: &Uploaded) -> bool {
     uploaded.announced.is_none_or(|size| usize::try_from(size) == Ok(uploaded.bytes.len()))
 }
 
-/// Doubled frames can cost segments of zeros, and the CRC of zeros is always 0.
+/// Repeated frames can cause the loss of segments of zeros. The CRC of zeros is 0, so it does not show this.
 #[test]
 fn size_of_an_upload_shows_lost_zeros() {
     let data = vec![0; 1770];

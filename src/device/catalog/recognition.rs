@@ -40,7 +40,7 @@ impl Model {
     }
 }
 
-/// A description that is parsed only if a device may fit.
+/// A description of the user, or a built-in one, which is parsed only if a device may fit.
 #[derive(Clone, Copy)]
 enum Candidate {
     Own(&'static Arc<Model>),

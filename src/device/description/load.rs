@@ -34,8 +34,8 @@ pub fn read_with_notes(text: &str) -> (Result<Description, Vec<DescriptionError>
     (result, notes)
 }
 
-/// Reads only the table `[identify]`, which must precede the arrays of tables. This is much faster than to read a whole
-/// description. `None` if the table has mistakes, and an empty value if it is missing.
+/// Reads only the table `[identify]`, which must precede the arrays of tables. This is much faster than reading a
+/// whole description. `None` if the table has mistakes, and an empty value if it is missing.
 pub(in crate::device) fn read_identify(text: &str) -> Option<Identify> {
     let start = text.split("\n[[").next()?;
     let source = Source::new(start);
