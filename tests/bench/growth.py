@@ -66,7 +66,7 @@ def latency(directory):
         report("latency", line, far, "s", f"without latency {near:.3f} s; waits", (far - near) * 1000 / LATENCY_MS)
 
 
-# The length of a line in a recording, in bytes.
+# The mean length of a line in a recording, in bytes.
 LINE = 38
 
 
@@ -86,11 +86,11 @@ def growth(directory, largest=8):
     recording = os.path.join(directory, "frames.log")
     setup = [frame for _, frame in Traced(directory, ['kind = "dps"\nnode = 1'], "log", "1", "--duration", "1s").frames]
     for exponent in range(3, largest + 1):
-        frames = 10**exponent // LINE
-        write_recording(recording, setup, frames)
+        write_recording(recording, setup, max(1, 10**exponent // LINE - len(setup)))
         log = [BINARY, "-q", "-b", "replay:" + recording, "log", "1", "--passive", "-o", os.path.join(directory, "rows"), "--force"]
         took, memory = measured(log)
-        report("growth", f"replay, 10^{exponent} bytes, {memory:.1f} MB memory", took, "s", "per frame, us", took * 1e6 / frames)
+        size = os.path.getsize(recording)
+        report("growth", f"replay, {size / 1e6:.3f} MB, {memory:.1f} MB memory", took, "s", "per frame, us", took * 1e6 * LINE / size)
     frames = 10**5
     write_recording(recording, setup, frames)
     for count in (1, 10, 100, 1000):
