@@ -13,7 +13,9 @@ const URGENT_TIME: Duration = Duration::from_secs(1);
 /// The density of the traffic, and the last send.
 #[derive(Debug)]
 pub(super) struct Traffic {
-    sent_at: Option<Mono>,
+    /// Whether a frame was sent, and none was received since then. The clock is not read at a send.
+    has_sent: bool,
+    urgent_until: Mono,
     /// The number of frames in the last batch.
     count: u32,
     /// The time of the last frame before this batch.
@@ -22,12 +24,12 @@ pub(super) struct Traffic {
 
 impl Traffic {
     pub(super) fn new() -> Traffic {
-        Traffic { sent_at: None, count: 0, before: Mono::START }
+        Traffic { has_sent: false, urgent_until: Mono::START, count: 0, before: Mono::START }
     }
 
     /// Records a send.
-    pub(super) fn on_send(&mut self, at: Mono) {
-        self.sent_at = Some(at);
+    pub(super) fn on_send(&mut self) {
+        (self.has_sent, self.count) = (true, 0);
     }
 
     /// Records that `count` frames were read with one system call. `before` is the time of the frame before them.
@@ -42,10 +44,14 @@ impl Traffic {
 
     /// Whether the traffic is dense, and the next frames are not answers to this program. `last_frame_at` is the time of
     /// the last frame of the batch.
-    pub(super) fn can_collect(&self, last_frame_at: Mono, now: Mono) -> bool {
-        let is_urgent = self.sent_at.is_some_and(|sent_at| now.since(sent_at) < URGENT_TIME);
-        let is_dense = self.count > 0 && last_frame_at.since(self.before) * DENSE <= COLLECT_TIME * self.count;
-        is_dense && !is_urgent
+    pub(super) fn can_collect(&mut self, last_frame_at: Mono) -> bool {
+        if self.count == 0 {
+            return false;
+        }
+        if std::mem::take(&mut self.has_sent) {
+            self.urgent_until = last_frame_at + URGENT_TIME;
+        }
+        last_frame_at >= self.urgent_until && last_frame_at.since(self.before) * DENSE <= COLLECT_TIME * self.count
     }
 }
 
@@ -60,22 +66,27 @@ mod tests {
     #[test]
     fn four_frames_in_a_millisecond_are_dense() {
         let mut traffic = Traffic::new();
-        assert!(!traffic.can_collect(at(0), at(0)));
+        assert!(!traffic.can_collect(at(0)));
         for (count, took, is_dense) in [(1, 250, true), (1, 251, false), (40, 1100, true), (4, 1001, false)] {
             traffic.on_batch(count, at(5000));
-            assert_eq!(traffic.can_collect(at(5000 + took), at(9000)), is_dense, "{count} frames in {took} us");
+            assert_eq!(traffic.can_collect(at(5000 + took)), is_dense, "{count} frames in {took} us");
         }
         traffic.on_batch(40, at(5000));
         traffic.on_silence();
-        assert!(!traffic.can_collect(at(5000), at(9000)));
+        assert!(!traffic.can_collect(at(5000)));
     }
 
     #[test]
     fn answers_are_read_at_once() {
         let mut traffic = Traffic::new();
-        traffic.on_send(at(1000));
         traffic.on_batch(40, at(5000));
-        assert!(!traffic.can_collect(at(6000), at(1_000_999)));
-        assert!(traffic.can_collect(at(6000), at(1_001_000)));
+        assert!(traffic.can_collect(at(6000)));
+        traffic.on_send();
+        // The time of the send is not known before the next frame.
+        assert!(!traffic.can_collect(at(6000)));
+        for (last_frame_at, is_answered) in [(90_000_000, false), (90_999_999, false), (91_000_000, true)] {
+            traffic.on_batch(40, at(last_frame_at - 1000));
+            assert_eq!(traffic.can_collect(at(last_frame_at)), is_answered, "{last_frame_at}");
+        }
     }
 }

@@ -339,7 +339,7 @@ impl SocketCan {
                 self.fill(false)?;
             } else if self.expected_answers > 0 && self.is_up && allows_wait {
                 self.expected_answers -= 1;
-                if deadline.is_some() && self.traffic.can_collect(self.last_frame_at, self.latest()) {
+                if deadline.is_some() && self.traffic.can_collect(self.last_frame_at) {
                     std::thread::sleep(dense::COLLECT_TIME);
                 }
                 if !self.fill(true)? && deadline.is_none() {
@@ -464,7 +464,7 @@ impl Bus for SocketCan {
             return Err(BusError::ListenOnly(self.name.clone()));
         }
         self.expected_answers = ANSWERS;
-        self.traffic.on_send(self.latest());
+        self.traffic.on_send();
         self.socket.write_frame(&to_kernel(frame)).map_err(|error| {
             // The kernel reports these errors only once, to the first call.
             match error.raw_os_error() {
