@@ -3,7 +3,7 @@
 //!
 //! A system call costs more than all other work for a frame. So one `recvmmsg` serves up to 64 calls of `receive`, with
 //! one reading of the clock. The program waits only after the socket was found empty. In dense traffic, frames collect in
-//! the kernel first ([`dense`]).
+//! the kernel first (`dense.rs`).
 
 mod clocks;
 mod convert;
