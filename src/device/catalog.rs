@@ -315,6 +315,36 @@ mod tests {
     }
 
     #[test]
+    fn another_value_of_a_confirming_object_is_not_recognised() {
+        let mut count = 0;
+        for model in built_in() {
+            let identify = &model.description.identify;
+            let mut own = IdentityAnswers {
+                device_type: identify.device_type,
+                vendor_id: identify.vendor_id,
+                product_code: identify.product_code,
+                device_name: identify.device_name.clone(),
+                answers: BTreeMap::new(),
+            };
+            for (&object, value) in &identify.confirm {
+                let data_type = model.dictionary.get(object).unwrap().data_type;
+                own.answers.insert(object, value.encode(data_type, NodeId::MIN).unwrap());
+            }
+            let name = &model.description.name;
+            for object in identify.confirm.keys() {
+                let is_this =
+                    |answers: &IdentityAnswers| recognise(answers).is_some_and(|found| found.description.name == *name);
+                assert!(is_this(&own), "{name}");
+                let mut other = own.clone();
+                other.answers.get_mut(object).unwrap()[0] ^= 1;
+                assert!(!is_this(&other), "{name} {object}");
+                count += 1;
+            }
+        }
+        assert!(count >= 3, "{count} confirming objects");
+    }
+
+    #[test]
     fn real_defaults_have_a_point() {
         for model in built_in() {
             for object in &model.description.objects {
